@@ -156,7 +156,7 @@ def lyapunov(
     --------
     >>> axes = Figure().subplots()
     >>> drawn = figures.lyapunov(axes, gearchaos.open_result("pan2021.h5"))
-    >>> axes.get_xlim()[0] < 5.0 < axes.get_xlim()[1]
+    >>> bool(axes.get_xlim()[0] < 5.0 < axes.get_xlim()[1])
     True
     """
     shown = _exponents(result, between)

@@ -65,7 +65,7 @@ def _derive(
 
 # Ones may not fit what is known.
 @np.errstate(all="ignore")
-def asked_for(group: str, physical: Mapping[str, Any]) -> Collection[str]:
+def paths_behind(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     """Return the paths of the physical data from which a group follows.
 
     ``physical`` is as `derive_groups` takes it; an unknown value is replaced by 1.
@@ -73,7 +73,7 @@ def asked_for(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     quantities = Quantities(physical, np.ones(2))
     with suppress(ArithmeticError, ValueError):
         _DERIVATIONS[group](quantities)
-    return quantities.asked_for
+    return quantities.read_paths
 
 
 class _UnknownError(Exception):
@@ -85,10 +85,10 @@ class Quantities:
 
     def __init__(self, physical: Mapping[str, Any], unknown: Floats | None = None) -> None:
         self.physical, self._unknown = physical, unknown
-        self.asked_for: dict[str, None] = {}
+        self.read_paths: dict[str, None] = {}
 
     def __getitem__(self, path: str) -> Any:
-        self.asked_for[path] = None
+        self.read_paths[path] = None
         value = self.physical[path]
         value = self._unknown if value is None else value
         if value is None:

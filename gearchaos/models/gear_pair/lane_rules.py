@@ -9,7 +9,7 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.tables import swept_values
 from gearchaos.errors import ConfigurationError
-from gearchaos.models.gear_pair.derivation import asked_for, derive_groups
+from gearchaos.models.gear_pair.derivation import derive_groups, paths_behind
 from gearchaos.models.gear_pair.group_table import (
     GROUPS_BY_NAME,
     HARMONICS,
@@ -93,7 +93,9 @@ def _without_effect(config: GearPairTables, table: str, values: Floats) -> Fault
 def _missing(config: GearPairTables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
-    lacking = [path for path in asked_for(row.name, config.physical()) if _is_unknown(config, path)]
+    lacking = [
+        path for path in paths_behind(row.name, config.physical()) if _is_unknown(config, path)
+    ]
     otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
     name = f"the {row.long_name} ({row.symbol})"
     rule = f"{name} is needed{because} and neither given nor derivable"
@@ -112,7 +114,7 @@ def _out_of_range(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fa
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
             worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
-            paths = ", ".join(asked_for(name, config.physical()))
+            paths = ", ".join(paths_behind(name, config.physical()))
             rule = f"derived from {paths}, must be {row.valid.rule}"
             remedy = "check the magnitudes of those keys"
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
