@@ -15,7 +15,7 @@ The element never separates, hits one flank, hits both flanks, or has no contact
 def contact_summary(contact: Floats, periods: int) -> dict[str, Array]:
     """Return contact and impacts of one element, each of shape (lanes,), by name.
 
-    ``contact`` (lanes, 6): values of one element of an `Outcome` over a number of mesh periods.
+    ``contact`` (lanes, quantities): values of one element of an `Outcome` over some mesh periods.
     Speeds are NaN in lanes without an impact.
     """
     driving, on_driving, back, on_back, speeds, largest = contact.T

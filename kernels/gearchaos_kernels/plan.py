@@ -145,9 +145,9 @@ class Outcome(NamedTuple):
         Smallest speed of a gap at a crossing per unit of tau, or infinity.
     overflows : array of int, shape (lanes,)
         Number of steps in which not all crossings were resolved, in all periods.
-    contact : array, shape (lanes, elements, 6) or (lanes, 0, 6)
-        For each element in the recorded periods: mesh periods on the driving flank, impacts on it,
-        both for the back flank, sum and maximum of the impact speeds per unit of tau.
+    contact : array, shape (lanes, elements, quantities) or (lanes, 0, quantities)
+        For each element in the recorded periods, in the order of `recorders.contact`: mesh periods
+        on the driving flank, impacts on it, both for the back flank, impact speeds per unit of tau.
     loads : array, shape (lanes, signals, 4) or (lanes, 0, 4)
         Maximum, minimum, mean and mean square in the recorded periods, of the forces of all
         elements and then of the observed signals.
