@@ -105,7 +105,7 @@ class OptionParser(ArgumentParser, Generic[Options]):
 
     @property
     def version(self) -> str:
-        """What --version prints; looking it up takes as long as reading all options."""
+        """Text of --version; looking it up takes as long as reading all options."""
         return version_text()
 
     def error(self, message: str) -> NoReturn:

@@ -1,4 +1,4 @@
-"""What all commands have in common: they read options, run a body and return an exit code."""
+"""Common parts of all commands: they read options, run a body and return an exit code."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""What ``sweep --dry-run`` prints: the lanes of a sweep, and the time and memory it would take."""
+"""Output of ``sweep --dry-run``: the lanes of a sweep, and the time and memory it would take."""
 
 import json
 import math
@@ -37,7 +37,7 @@ SAMPLE_PERIODS = 1000
 
 
 class Estimate(NamedTuple):
-    """What a run, or one shard of it, takes.
+    """Size, time and memory of a run, or of one shard of it.
 
     ``lanes`` is their number, ``every`` that of the whole sweep. ``steps`` counts those of all
     lanes. ``file_bytes`` is the size before compression, ``memory_bytes`` the peak of the process.

@@ -4,7 +4,7 @@ GB/T 10095.1-2008 is that of 1995. It takes the geometric means of ranges of mod
 that of 2013 the two themselves; both have a factor of sqrt(2) from grade to grade, beginning with
 grade 5, and round to 0.1 um below 5 um, to 0.5 um up to 10 um, and to whole ones above.
 
-How sure this is: formulas, ranges and rounding agree with public programs of others (two for each
+Verification: formulas, ranges and rounding agree with public programs of others (two for each
 edition), those of 1995 also with values printed from it (grade 7, module over 2 to 3.5 mm: 11 um
 for diameters over 20 to 50 mm, 12 um over 50 to 125 mm). They have not been compared with every
 entry of the tables of 1995, which leave out large modules on small diameters.
@@ -29,7 +29,7 @@ _GEARS_OF_2013 = {
     "helix angle": (0, 45, " degree"),
     "face width": (4, 1200, " mm"),
 }
-"""What else the scope of the edition of 2013 limits: lowest and highest value, and unit."""
+"""Further limits of the edition of 2013: lowest and highest value, and unit."""
 
 
 def require_gear(teeth: int, helix_angle_deg: float, face_width_mm: float, edition: int) -> None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gearchaos.models import Configuration
 
     Asked = tuple[Configuration, str, list[str], Any]
-    """What to compute, the configuration as it was written, notes, and the fixed axes."""
+    """The run, the configuration as written, notes, and the fixed axes."""
 
 
 class ResponseOptions(NamedTuple):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Software(NamedTuple):
-    """What decides the numbers of a sweep beside its configuration, by its name in files."""
+    """The software that, with the configuration, determines the numbers of a sweep."""
 
     software: str
     kernels: str

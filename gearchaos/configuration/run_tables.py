@@ -158,7 +158,7 @@ class Integration(Table):
 
 
 class Outputs(Table, Generic[State]):
-    """What is kept of every lane."""
+    """The kept outputs of every lane."""
 
     section: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
         "states recorded once per mesh period", example=["delta_5"], default=()

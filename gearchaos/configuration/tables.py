@@ -70,7 +70,7 @@ class Tables(Titled):
     second_sweep: Sweep | None = key(default=None)
     """a second swept parameter: every value of it with every one of [sweep]"""
     integration: Integration = key("the fixed grid of the integration", default=Integration())
-    outputs: Outputs[str] = key("what is kept of every lane", default=Outputs())
+    outputs: Outputs[str] = key("the kept outputs of every lane", default=Outputs())
     files: dict[str, str] | None = key(default=None)
     """files that are named above, word for word, as a result keeps them"""
 

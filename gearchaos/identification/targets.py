@@ -130,7 +130,7 @@ class Targets(Table):
     configuration: str = key("file with all that is known, beside this one", example="pair.toml")
     set: Several[str] = key("keys of it that are replaced, as by --set", default=())
     search: Search = key("how much is tried", default=Search())
-    parameter: Several[FreeParameter] = key("what is free", min_length=1, max_length=MOST_FREE)
+    parameter: Several[FreeParameter] = key("free parameters", min_length=1, max_length=MOST_FREE)
     stage: Several[ObservedStage] = key("observed stages", default=())
     jump: Several[ObservedPlace] = key("observed jumps", default=())
     crisis: Several[ObservedPlace] = key("observed crises", default=())

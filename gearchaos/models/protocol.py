@@ -1,4 +1,4 @@
-"""What the engine needs of a model beside its configuration and its compiled formulas."""
+"""The interface of a model for the engine, beside its configuration and compiled formulas."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping
@@ -115,7 +115,7 @@ class Model(ABC):
     def remarks(
         self, config: Any, system: LaneSystem, parameters: Mapping[str, Floats]
     ) -> Iterator[str]:
-        """Yield what a user should know before the sweep runs, of some of its lanes."""
+        """Yield remarks for the user before the sweep runs, about some of its lanes."""
         del config, system, parameters
         yield from ()
 

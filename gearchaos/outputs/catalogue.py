@@ -213,7 +213,7 @@ CHECK_PART = Part(
         ),
         Output(
             "motion_changed",
-            "whether the lane moves in another way when the step is halved",
+            "whether the lane settles on a different motion when the step is halved",
             dtype="uint8",
             fill_value=None,
         ),

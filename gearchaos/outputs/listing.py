@@ -20,7 +20,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Details(NamedTuple):
-    """What is known of outputs of a result beforehand, by their names in the catalogue.
+    """Details of outputs that are known before a run, by their names in the catalogue.
 
     ``values``: arrays of coordinates. ``meanings``: of the values 0, 1, ... of enumerations.
     ``wordings``: texts that replace `SUBJECT` in the long name of an output without one.

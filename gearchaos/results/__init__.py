@@ -1,1 +1,1 @@
-"""Named arrays with units, the HDF5 files that hold them, and what is read off them."""
+"""Named arrays with units, their HDF5 files, and their evaluation."""

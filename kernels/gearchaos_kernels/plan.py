@@ -119,7 +119,7 @@ STATUS_TEXTS = {
     Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
     Status.TOO_FAST: "moves faster than so few flow maps can follow, and was stopped",
 }
-"""What each status means, as a text for people."""
+"""Meaning of each status in words."""
 
 
 class Outcome(NamedTuple):

@@ -21,7 +21,7 @@ from numba.extending import NativeValue, models, register_model, typeof_impl, un
 
 @dataclass(frozen=True)
 class Scene:
-    """What a compiled loop contains. A flag is True if it is contained, otherwise None.
+    """The contents of a compiled loop. A flag is True if it is contained, otherwise None.
 
     A flag of a model may also be a frozen dataclass that describes what the formulas contain.
 

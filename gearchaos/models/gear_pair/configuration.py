@@ -31,5 +31,5 @@ class GearPairConfiguration(GearPairTables, Configuration):
         return with_deviation_files(tables, folder)
 
     def lane_faults(self) -> Iterator[Fault]:
-        """Yield what is wrong with the groups of the lanes, where each table is sound."""
+        """Yield the faults of the groups of the lanes, where each table is sound."""
         return lane_faults(self)

@@ -19,7 +19,7 @@ MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
 
 _ROUNDING = 1e-9
-"""Harmonics and phases, relative, that are zero but for rounding."""
+"""Harmonics and phases, relative, that are zero up to rounding."""
 
 _SAMPLES = 64  # Places within a cell over which a share is averaged.
 
@@ -132,7 +132,7 @@ def contact_shares(
     own = complex(np.mean(lines.sum(axis=0) * np.exp(-2j * np.pi * samples)))
     turned = fundamental * own.conjugate()
     entry = -np.angle(turned) / (2.0 * np.pi) % 1.0 if abs(turned) > _ROUNDING else 0.0
-    # What rounding puts just before the end of a period is its beginning.
+    # A place that rounding puts just before the end of a period is its beginning.
     return shares, per_period, 0.0 if 1.0 - entry < _ROUNDING else float(entry)
 
 

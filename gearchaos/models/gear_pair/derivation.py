@@ -63,7 +63,7 @@ def _derive(
     return found
 
 
-# Ones may not fit what is known.
+# Ones may contradict the known data.
 @np.errstate(all="ignore")
 def paths_behind(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     """Return the paths of the physical data from which a group follows.
@@ -254,7 +254,7 @@ SCALES = {
     "mesh_period": ("s", "mesh period", ""),
     "static_load": ("N", "static load", ""),
 }
-"""What makes a model dimensionless, and two groups in units: unit, wording and symbol by name."""
+"""Scales of a model, and two groups in units: unit, wording and symbol by name."""
 
 _SCALE_DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     LENGTH: lambda q: q.length_scale / _MICROMETRE,

@@ -41,7 +41,7 @@ class ResolvedGroups:
         return [row for row in GROUP_TABLE if row.needed_by(active) and row.name not in self.values]
 
 
-# What is not finite is refused with its key, by the rules of the lanes.
+# The rules of the lanes reject values that are not finite, with their keys.
 @np.errstate(all="ignore")
 def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> ResolvedGroups:
     """Combine groups given directly with those that follow from physical data.

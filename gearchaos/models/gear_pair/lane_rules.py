@@ -22,7 +22,7 @@ from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS, GearPairTables, gro
 
 
 def lane_faults(config: GearPairTables) -> Iterator[Fault]:
-    """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
+    """Yield the faults of the groups of the lanes, if every single table is sound."""
     sweeps = config.sweeps
     # The groups are smooth in every parameter: both ends of a sweep and a value between them
     # represent millions of lanes. The axes are in the order of `axis_values`.

@@ -126,7 +126,7 @@ class GearPairModel(Model):
     def remarks(
         self, config: GearPairConfiguration, system: LaneSystem, parameters: Mapping[str, Floats]
     ) -> Iterator[str]:
-        """Yield what a user should know of the pair before the sweep runs."""
+        """Yield remarks for the user about the pair before the sweep runs."""
         assert isinstance(system, GearPairs)
         return remarks(config, system, parameters)
 

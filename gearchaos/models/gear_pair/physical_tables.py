@@ -136,7 +136,7 @@ class GearDeviations(Table):
     single_um: Numbers | None = _optional("single deviations: each from the tooth before it", "um")
     file: str | None = _optional("CSV file instead of a list, relative to the configuration")
     column: str | None = _optional("heading of the column to take", example="Fp")
-    holds: Literal["cumulative", "single"] = key("what the column holds", default="cumulative")
+    holds: Literal["cumulative", "single"] = key("content of the column", default="cumulative")
     counted: Literal["with_rotation", "against_rotation"] = key(default="with_rotation")
     """direction in which teeth are counted and deviations positive"""
     flank: Literal["right", "left"] | None = _optional("flank that was measured, for the record")

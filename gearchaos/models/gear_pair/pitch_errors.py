@@ -32,7 +32,7 @@ OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys that change the drawn gears, but no group."""
 
 _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
-"""What rounding in a list leaves of the sum of all single deviations, at most."""
+"""Largest sum of all single deviations that rounding in a list can leave."""
 
 
 def with_deviation_files(
@@ -178,7 +178,7 @@ def _keys_belong_to_the_kind(config: GearPairTables) -> Iterator[Fault]:
 
 
 def grade_faults(config: GearPairTables, swept: Mapping[str, Floats]) -> Iterator[Fault]:
-    """Yield what is wrong with the grades of the lanes; ``swept`` has both ends of every sweep."""
+    """Yield the faults of the grades of the lanes; ``swept`` has both ends of every sweep."""
     if not isinstance(config.pitch_error, GradeError):
         return
     for table, sweep in config.sweeps.items():

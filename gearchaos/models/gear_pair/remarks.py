@@ -1,4 +1,4 @@
-"""What a user should know of a gear pair before its sweep runs."""
+"""Remarks for the user about a gear pair before its sweep runs."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Rules that tie several keys of a gear pair together, but for those of its lanes."""
+"""Rules between several keys of a gear pair, except those of its lanes."""
 
 from collections.abc import Iterator
 from functools import partial

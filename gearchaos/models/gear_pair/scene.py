@@ -35,7 +35,7 @@ def states_of(effects: Collection[str]) -> tuple[str, ...]:
 
 
 class Scene(run_tables.Scene):
-    """Which effects exist; what is not listed is not computed."""
+    """The included effects; all others are left out."""
 
     effects: Annotated[tuple[Effect, ...], AS_LIST, ONCE] = key(
         "the effects that exist beside torsion and mesh damping",
@@ -57,7 +57,7 @@ class Start(run_tables.Start[State]):
 
 
 class Outputs(run_tables.Outputs[State]):
-    """What is kept of every lane."""
+    """The kept outputs of every lane."""
 
     section: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
         "states recorded once per mesh period", example=["delta_5"], default=("delta_5",)

@@ -123,7 +123,7 @@ class GearPairTables(Tables, PhysicalTables):
 
     scene: Scene = key("which effects exist")
     start: Start = key("the state in which the lanes start", default=Start())
-    outputs: Outputs = key("what is kept of every lane", default=Outputs())
+    outputs: Outputs = key("the kept outputs of every lane", default=Outputs())
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ class Machine(NamedTuple):
 
 
 class Kinds(NamedTuple):
-    """What all lanes of a machine have in common.
+    """The common properties of all lanes of a machine.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""What is read off a result: slices, stages, jumps, crises, ensembles, overview and tables."""
+"""Evaluation of results: slices, stages, jumps, crises, ensembles, overview and tables."""

@@ -1,4 +1,4 @@
-"""What a method of integration is: how lanes take a step, and what it prepares before."""
+"""The interface of integration methods: their preparations, and how lanes take a step."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -128,7 +128,7 @@ class StepAt(NamedTuple):
 
 
 class StepInputs(NamedTuple):
-    """What the steps of a block read.
+    """The inputs of the steps of a block.
 
     Attributes
     ----------

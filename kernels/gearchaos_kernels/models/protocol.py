@@ -1,4 +1,4 @@
-"""What a model is: the equations of motion of a system with clearance elements.
+"""The interface of models: the equations of motion of a system with clearance elements.
 
 A model has coordinates, each with a rate, and elements that act on them. All formulas are in scaled
 coordinates per step: displacements in a scale that the model chooses, rates per step, accelerations
@@ -40,7 +40,7 @@ class Gap(NamedTuple):
 
 
 class ElementKind(NamedTuple):
-    """What kind of clearance an element has.
+    """The kind of an element.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ class Model:
 
 @dataclass(frozen=True, kw_only=True)
 class MapFormulas:
-    """What flow maps need of a model whose excitation is a sum of waves.
+    """The formulas of a model for flow maps; its excitation is a sum of waves.
 
     Attributes
     ----------

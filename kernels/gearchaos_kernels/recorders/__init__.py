@@ -1,1 +1,1 @@
-"""What can be recorded of every lane during an integration, one recorder per file."""
+"""Recorders of every lane during an integration, one per file."""

@@ -1,4 +1,4 @@
-"""What a recorder is: it accumulates something of every lane during an integration.
+"""The interface of recorders, which accumulate data of every lane during an integration.
 
 A recorder uses rows in the memory of a block and is called at fixed moments. Only the recorders
 that a scene names are compiled.
@@ -117,7 +117,7 @@ class Recorder:
 
 
 class Records(NamedTuple):
-    """What recorders read and write.
+    """The inputs and outputs of recorders.
 
     Attributes
     ----------

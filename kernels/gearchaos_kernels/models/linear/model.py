@@ -35,7 +35,7 @@ class Linear:
 
 
 class Forcing(NamedTuple):
-    """What acts on a lane at a mesh phase; each entry is a tuple.
+    """Forces and stiffnesses of a lane at a mesh phase; each entry is a tuple.
 
     Attributes
     ----------

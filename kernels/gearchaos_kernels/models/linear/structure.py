@@ -30,7 +30,7 @@ def entries_of(matrices: NDArray[np.float64]) -> Entries:
 
 @dataclass(frozen=True)
 class Structure:
-    """What the equations of a system contain; every entry is a place (row, column) of a matrix.
+    """The terms of the equations of a system; every entry is a place (row, column) of a matrix.
 
     Attributes
     ----------
