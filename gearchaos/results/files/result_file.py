@@ -23,7 +23,7 @@ from gearchaos.results.files.atomic_file import append_checksum, replacing
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "3.2"
 CONVENTIONS = "CF-1.9"  # The first version with uint8.
-PARAMETERS = "parameters"
+PARAMETER_GROUP = "parameters"
 DIMS = "dims"
 """Attribute with the names of dimensions. HDF5's own list is in the global heap, which is slow and
 unsafe to read."""
@@ -233,9 +233,9 @@ def _attach_scales(file: h5py.File, name: str, dims: tuple[str, ...]) -> None:
 
 
 def _write_parameters(file: h5py.File, parameters: Mapping[str, Variable]) -> None:
-    file.create_group(PARAMETERS, track_order=True)
+    file.create_group(PARAMETER_GROUP, track_order=True)
     for name, parameter in parameters.items():
-        path, values = f"{PARAMETERS}/{name}", np.asarray(parameter.values, dtype=np.float64)
+        path, values = f"{PARAMETER_GROUP}/{name}", np.asarray(parameter.values, dtype=np.float64)
         dataset = file.create_dataset(path, data=values, track_order=True)
         _attach_scales(file, path, parameter.dims)
         _describe(dataset, parameter.attributes)

@@ -18,7 +18,7 @@ from gearchaos.outputs.names import DIRECTION, HARMONIC, STATE, STATUS
 from gearchaos.outputs.variable import ORIGINS, Variable
 from gearchaos.results.files import stored_dataset as stored
 from gearchaos.results.files.atomic_file import checksum_fits, reason
-from gearchaos.results.files.result_file import PARAMETERS, SCHEMA, SCHEMA_VERSION
+from gearchaos.results.files.result_file import PARAMETER_GROUP, SCHEMA, SCHEMA_VERSION
 from gearchaos.results.files.stored_dataset import UnfitError
 
 Contents = tuple[
@@ -71,7 +71,7 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
         "the checksum of the file fits" if fits else foreign,
         "all numbers can be read, and fit the checksums of their chunks where there are any",
         f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
-        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
+        f"{len(parameters)} {PARAMETER_GROUP} have their types, dimensions and sizes",
     ]
 
 
@@ -148,7 +148,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     fixed_coordinates(metadata)
     parameters = {}
     for path, dataset in grouped.items():
-        notes, name = stored.scalars_of(dataset), path.removeprefix(f"{PARAMETERS}/")
+        notes, name = stored.scalars_of(dataset), path.removeprefix(f"{PARAMETER_GROUP}/")
         dims = stored.dims_of(path, dataset, notes, sizes)
         origin = str(notes.get("origin"))
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.results.files.atomic_file import reason
-from gearchaos.results.files.result_file import DIMS, PARAMETERS
+from gearchaos.results.files.result_file import DIMS, PARAMETER_GROUP
 
 _DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
 _PACKED, _ROOM = 128, 1 << 20
@@ -43,11 +43,11 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
     # From the root group: h5py 3.11 lists a file by name, but the group in the order of creation.
     names = _names(file["/"])
     # Optional: a copy of the root group alone has no parameters.
-    if PARAMETERS in names:
-        names.remove(PARAMETERS)
-        if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-            raise UnfitError(f"holds {PARAMETERS} as something else than a group")
-        names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
+    if PARAMETER_GROUP in names:
+        names.remove(PARAMETER_GROUP)
+        if not isinstance(_hard_linked(file, PARAMETER_GROUP), h5py.Group):
+            raise UnfitError(f"holds {PARAMETER_GROUP} as something else than a group")
+        names += [f"{PARAMETER_GROUP}/{name}" for name in _names(file[PARAMETER_GROUP])]
     datasets = {name: _hard_linked(file, name) for name in names}
     whole = file.id.get_filesize()
     left = _PACKED * (whole + _ROOM)

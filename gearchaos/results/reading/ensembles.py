@@ -33,7 +33,7 @@ class Counted(NamedTuple):
         return wilson_interval(self.counts, self.lanes)
 
 
-class Shares(NamedTuple):
+class MotionShares(NamedTuple):
     """Motions over one swept parameter; all drawn systems and starts of a value are counted.
 
     Attributes
@@ -71,7 +71,7 @@ def motion_kinds(result: Result) -> tuple[Counts, list[str]]:
     return kinds, names + [label_text(flag, 0) for flag in result.variables["motion"].flags]
 
 
-def motion_shares(result: Result) -> Shares:
+def motion_shares(result: Result) -> MotionShares:
     """Count the motions at each value of the swept parameter of a result.
 
     Parameters
@@ -81,7 +81,7 @@ def motion_shares(result: Result) -> Shares:
 
     Returns
     -------
-    Shares
+    MotionShares
 
     Raises
     ------
@@ -113,7 +113,7 @@ def motion_shares(result: Result) -> Shares:
     if CROSSINGS in result:
         crossings = result[CROSSINGS].reshape(kinds.shape)
         apart = Counted(np.sum(crossings > 0.0, axis=1), np.sum(np.isfinite(crossings), axis=1))
-    return Shares(values, tuple(seen), np.stack([*seen.values()], axis=1), other, apart)
+    return MotionShares(values, tuple(seen), np.stack([*seen.values()], axis=1), other, apart)
 
 
 class Basin(NamedTuple):
