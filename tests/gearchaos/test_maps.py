@@ -190,7 +190,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
 
 def test_one_start_of_several_is_chosen_and_reported():
     several = result_over(ERRORS, SPEEDS, CATALOGUE.axis("start", np.arange(2)))
-    with pytest.raises(FigureError, match=r"along start, of which.*--at start=0"):
+    with pytest.raises(FigureError, match=r"along start; a map shows one of them.*--at start=0"):
         map_page(several)
     assert map_page(several.sel(start=1)).get_suptitle() == "start 1"
 
