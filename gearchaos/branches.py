@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import Command
-from gearchaos.options import Option, Overwrite, Place, coordinates
+from gearchaos.options import Option, Overwrite, Place, placed_coordinates
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _branches(options: BranchesOptions) -> None:
     output = options.output or Path(f"{source.stem}_branches.h5")
     check_output(output, options.overwrite)
     result = _result(source)
-    places = coordinates(options.at, result.axes, result.axis)
+    places = placed_coordinates(options.at, result.axes, result.axis)
     result = result.sel("within", **places) if places else result
     with compiling():
         found = find_branches(result, options.source, options.periods)

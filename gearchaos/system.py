@@ -389,10 +389,9 @@ class System:
 
         Examples
         --------
-        >>> system = System("sweeps/pan2021.toml", pitch_error=1.2)
-        >>> branch = system.branch(system.orbit(), "pitch_error", 0.5, 2.0)
-        >>> [special.kind for special in branch.specials]
-        ['grazing', 'fold', 'fold']
+        >>> branch = system.branch(system.orbit(period=2), "pitch_error", 10.7, 10.8)
+        >>> branch.period, branch.ends
+        (2, ('edge of the range', 'edge of the range'))
         """
         instance("orbit", orbit, Orbit, "System.orbit finds it")
         instance("parameter", parameter, str, "name a group, or a key by its path")
@@ -448,9 +447,8 @@ class System:
 
         Examples
         --------
-        >>> system = System("sweeps/pan2021.toml", pitch_error=12.47)
-        >>> system.orbits(1)[0].stable
-        False
+        >>> [orbit.stable for orbit in system.orbits(2, record=200)]
+        [True]
         """
         period = whole_number("period", period, least=1)
         record = whole_number("record", record, least=period + 1)

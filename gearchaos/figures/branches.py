@@ -128,7 +128,7 @@ def _rows(found: BranchSet, branch: PeriodicBranch, name: str) -> Floats:
 
 def _pieces(branch: PeriodicBranch) -> Iterator[tuple[slice, bool]]:
     """Cut the points of a branch into pieces of one stability that share their end points."""
-    # At a special point a modulus is 1 but for rounding; it belongs to the pieces on both sides.
+    # At a special point a modulus is 1 up to rounding. It belongs to the pieces on both sides.
     unstable = np.abs(branch.multipliers[:, 0]) > 1.0 + ON_CIRCLE
     stable = ~(unstable[1:] | unstable[:-1])
     changes = np.flatnonzero(np.diff(stable)) + 1
@@ -158,7 +158,7 @@ def _draw_specials(
 
 
 def _include(axes: Axes, heights: Floats) -> None:
-    """Extend the limits along y by a margin beyond heights, some of which may be NaN."""
+    """Extend the limits along y to a margin beyond heights; NaN is ignored."""
     if not np.isfinite(heights).any():
         return
     low, high = axes.get_ylim()
