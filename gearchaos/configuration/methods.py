@@ -63,7 +63,7 @@ INTEGRATORS = (
         exact=True,
         always_resolved=True,
         shares_maps=True,
-        most_elements=4,
+        most_elements=52,
     ),
 )
 """The methods that integrate lanes."""

@@ -130,6 +130,7 @@ def _integrate_share(
         share.order,
         share.blocks,
         share.maps,
+        share.lacked,
         chosen,
         np.stack([np.cos(phases), np.sin(phases)], axis=2),
     )
@@ -140,6 +141,8 @@ def _integrate_share(
         plan.first_period,
         more_rows=2 * (chosen.size - 1 + chosen.size * orders.size),
     )
+    # Lanes that lacked maps were stopped in an earlier share.
+    outcome.status[share.order], outcome.diverged_period[share.order] = Status.OK, -1
     tables, next_block = system.tables(plan.steps_per_period), np.zeros(1, dtype=np.intp)
     _integrate_blocks(get_num_threads(), next_block, batch, tables, schedule, outcome, scene)
     if share.maps.size:

@@ -78,7 +78,7 @@ class Batch(NamedTuple):
         State and tangent vector at tau = 0, in the units of the equations.
     steps_between_scalings : array of int, shape (lanes,)
         Steps between two scalings of a tangent vector to length 1.
-    order, blocks, maps : array
+    order, blocks, maps, lacked : array
         See `methods.protocol.Share`.
     chosen : array of int, shape (states + 1,)
         Rows of the states whose extremes are recorded, then the row of the observed signal.
@@ -94,6 +94,7 @@ class Batch(NamedTuple):
     order: NDArray[np.intp]
     blocks: NDArray[np.intp]
     maps: NDArray[np.float64]
+    lacked: NDArray[np.intp]
     chosen: NDArray[np.intp]
     turns: NDArray[np.float64]
 
@@ -102,14 +103,18 @@ class Batch(NamedTuple):
 def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
     """Integrate the lanes of a block, and write what is recorded of them into the outcome."""
     align_stack()
-    first, lanes, steps, maps_at = batch.blocks[number_of_block]
+    about = batch.blocks[number_of_block]
+    first, lanes, steps, maps_at = about[0], about[1], about[2], about[3]
     memory = aligned_memory(rows(scene).total + plan.more_rows)
-    given = StepInputs(tables, batch.maps, workspace(scene))
+    lacked = batch.lacked[first : first + lanes]
+    given = StepInputs(tables, batch.maps, workspace(scene), about[4:], lacked)
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     substeps = steps // plan.steps_per_period
-    interval = begin(memory, block, batch, tables, plan.first_period, scene)
+    interval = begin(memory, block, batch, given, plan.first_period, scene)
     periods = plan.transient_periods + plan.recorded_periods
+    if all_stopped(lacked):
+        return
     for period in range(periods):
         recorded = period - plan.transient_periods
         clock = Clock(period, 0, steps, substeps, recorded, periods - 1 - period)
@@ -120,6 +125,8 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
             if scene.resolved is not None:
                 if suspects > 0:
                     resolve(memory, lanes, at, given, scene)
+                    if all_stopped(lacked):
+                        return
             clock = Clock(period, number, steps, substeps, recorded, periods - 1 - period)
             record_step(memory, block, clock, records, scene)
             if scene.tangent is not None:
@@ -134,6 +141,15 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
 
 
 @scalar
+def all_stopped(lacked):
+    """Return whether every lane of a block lacks maps, so that nothing of it is of use."""
+    stopped = 0
+    for number in lacked:
+        stopped += 1 if number >= 0 else 0
+    return (stopped > 0) & (stopped == lacked.shape[0])
+
+
+@scalar
 def start_period(memory, block, batch, tables, period, scene):
     """Prepare the slots of all lanes for a mesh period."""
     for slot in range(slots_of(block.lanes)):
@@ -142,11 +158,11 @@ def start_period(memory, block, batch, tables, period, scene):
 
 
 @scalar
-def begin(memory, block, batch, tables, period, scene):
+def begin(memory, block, batch, given, period, scene):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
     # Scaling at the shortest interval of the block is only a check: each lane keeps its own one.
     interval = batch.steps_between_scalings[batch.order[block.first]]
-    row_of = rows(scene)
+    row_of, tables = rows(scene), given.tables
     for slot in range(LANES):
         # Empty slots repeat the last lane. Nothing of theirs is stored.
         index = batch.order[block.first + min(slot, block.lanes - 1)]
@@ -169,7 +185,7 @@ def begin(memory, block, batch, tables, period, scene):
             state = from_kept(state_of(memory, slot, scene), forcing, scene)
             gaps = gaps_at(state, lane, forcing, scene)
             write_branches(memory, slot, branches_at(gaps, lane, scene), scene)
-        begin_lane(memory, slot, lane, scene)
+        begin_lane(memory, slot, lane, given, scene)
     return interval
 
 

@@ -92,18 +92,15 @@ def _known_states(table: str, name: str) -> Callable[["LinearConfiguration"], It
     return check
 
 
-def _maps_of_all_branches_fit(config: "MachineConfiguration") -> Iterator[Fault]:
-    """A machine has at most as many elements as the method can integrate."""
+def _sets_of_branches_are_numbers(config: "MachineConfiguration") -> Iterator[Fault]:
+    """A machine has at most as many clearance elements as the method can integrate."""
     method = config.integration.method
     most = METHODS[method].most_elements
     if most is None or not config.is_complete:
         return
     count = len(config.kinds_of_elements.elements)
     if count > most:
-        rule = (
-            f"takes up to {most} clearance elements, because it needs maps for every set of "
-            f"contact branches; this machine has {count} elements, and {2**count} sets"
-        )
+        rule = f"takes up to {most} clearance elements; this machine has {count}"
         yield Fault("integration.method", rule, f'set it to "{DEFAULT.name}"', method)
 
 
@@ -112,7 +109,7 @@ def add_rules_of_machines(rules: Rules, tables: Sequence[str]) -> None:
 
     ``tables``: those on which states and elements depend.
     """
-    rules.reads(*tables, "integration")(_maps_of_all_branches_fit)
+    rules.reads(*tables, "integration")(_sets_of_branches_are_numbers)
     named = (("outputs", ("section", "states")), ("start", ("state", "box", "drawn")))
     for table, keys in named:
         for key in keys:

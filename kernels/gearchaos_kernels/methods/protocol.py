@@ -21,19 +21,23 @@ class Share(NamedTuple):
     ----------
     order : array of int, shape (lanes of the share,)
         Numbers of the lanes, block after block.
-    blocks : array of int, shape (blocks, 4)
+    blocks : array of int, shape (blocks, 4 or more)
         For each block: the place of its first lane in ``order``, its number of lanes, its steps per
-        mesh period, and the place where its maps begin in ``maps``.
+        mesh period, and the place where its maps begin in ``maps``. Then what `StepInputs.sets` holds.
     maps : array, shape (numbers,)
         What the method has prepared for these lanes; empty if nothing.
     steps : array of int, shape (lanes,)
         Steps per mesh period of every lane, including those of other shares.
+    lacked : array of int, shape (lanes of the share,) or (0,)
+        The loop writes here, in the order of ``order``, for which set of branches a lane lacks
+        maps, -1 for none. The method yields such lanes again in a later share.
     """
 
     order: Integers
     blocks: Integers
     maps: Floats
     steps: Integers
+    lacked: Integers
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class Method:
         Returns how many numbers are prepared for one step.
     workspace(scene)
         Returns what one block needs besides its memory.
-    begin_lane(memory, slot, lane, scene)
+    begin_lane(memory, slot, lane, given, scene)
         Prepares a lane before its first step.
     step(memory, lanes, at, given, scene)
         Takes one step in every slot; returns how many lanes may have left a contact branch.
@@ -138,11 +142,18 @@ class StepInputs(NamedTuple):
         See `Share`.
     work
         What `Method.workspace` returns.
+    sets : array of int
+        Number of each set of branches that has maps, followed by where they begin, relative to the
+        first ones of the block.
+    lacked : array of int
+        The part of `Share.lacked` for the lanes of the block.
     """
 
     tables: Any
     maps: Any
     work: Any
+    sets: Any
+    lacked: Any
 
 
 workspace = Interface("method", "workspace")

@@ -24,6 +24,7 @@ from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch,
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
+from gearchaos_kernels.methods.flow_map.sets import KNOWN, enter, find_maps, report, stop_lane
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
 from gearchaos_kernels.models.protocol import Gap
 
@@ -49,6 +50,8 @@ def cross_together(memory, slots, at, given, scene):
     for n in range(lanes):
         vectors.copy_lane(memory, slots[n], aside, n, scene)
         aside[aside_rows(scene).after * STRIDE + n] = -1.0
+    if place.on_demand:
+        share_maps(aside, lanes, scene)
     crossings, left = 0, lanes
     while left > 0 and crossings < MOST_CROSSINGS:
         crossings += 1
@@ -56,6 +59,8 @@ def cross_together(memory, slots, at, given, scene):
         for element in range(place.elements):
             find_moments(aside, element, lanes, scene)
         cross_over(aside, scene)
+        if place.on_demand:
+            find_maps_of(aside, slots, given, scene)
         for n in range(lanes):
             record_crossing_of(memory, slots[n], aside, n, at, scene)
         vectors.sum_along(aside, scene)
@@ -69,6 +74,34 @@ def cross_together(memory, slots, at, given, scene):
             copy_rows(aside, n, memory, slots[n], rows(scene).tangent, place.states)
         if aside[rows(scene).suspect * STRIDE + n] != 0.0:
             give_up(memory, slots[n], maps, maps_at, scene)
+        if place.on_demand:
+            enter_or_stop(memory, slots[n], given, scene)
+
+
+@scalar
+def find_maps_of(aside, slots, given, scene):
+    """Find the maps of the branches of up to eight lanes aside; report the sets that lack them."""
+    for n in range(slots.shape[0]):
+        number = find_maps(aside, n, given, scene)
+        if number != KNOWN:
+            report(slots[n], number, given)
+    share_maps(aside, slots.shape[0], scene)
+
+
+@scalar
+def share_maps(aside, lanes, scene):
+    """Let slots without a lane take the maps of the first lane, so that they take no time."""
+    first = method_rows(scene).maps * STRIDE
+    for n in range(lanes, VECTOR):
+        aside[first + n] = aside[first]
+
+
+@scalar
+def enter_or_stop(memory, slot, given, scene):
+    """Find the maps of the branches of a lane after a step; stop it if it has lacked some."""
+    enter(memory, slot, given, scene)
+    if given.lacked[slot] != KNOWN:
+        stop_lane(memory, slot, scene)
 
 
 @scalar

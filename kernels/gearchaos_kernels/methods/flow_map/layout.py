@@ -15,6 +15,13 @@ from gearchaos_kernels.scene import Scene, provider_of
 TERMS = 16
 """Number of terms of the polynomials along a step."""
 
+MOST_SETS_IN_ADVANCE = 4
+"""Largest number of sets of branches whose maps are all made in advance, for two elements.
+
+Lanes on any of them find their maps side by side. Of more sets, a motion visits few: their maps are
+made when a lane enters them.
+"""
+
 _VECTOR = CACHE_LINE // np.dtype(np.float64).itemsize
 """Numbers of a vector register, and of a cache line."""
 
@@ -45,7 +52,8 @@ class Work(NamedTuple):
 class Layout(NamedTuple):
     """Where the parts of the maps of one step begin, in numbers.
 
-    The numbers of a step are a header, then the maps of each set of branches.
+    The numbers of a step are a header, then the maps of each set of branches. If the maps of sets
+    are made on demand, each set has all steps to itself, with a header of its own.
 
     Attributes
     ----------
@@ -55,7 +63,10 @@ class Layout(NamedTuple):
     width : int
         Length of a column of the state, padded to fill vector registers.
     elements, branches : int
-        Number of elements, and of sets of branches that differ in which elements are engaged.
+        Number of elements, and of sets of branches in a step. Sets differ in which elements are
+        engaged.
+    on_demand : int
+        1 if the maps of a set are made when a lane enters it, 0 if those of all are there.
     gap, switch, damper : int
         Where the gaps, the switch terms of springs, and those of dampers that act in contact only
         begin within the maps of a set of branches; the map of the state comes first. Without such
@@ -77,6 +88,7 @@ class Layout(NamedTuple):
     width: int
     elements: int
     branches: int
+    on_demand: int
     gap: int
     switch: int
     damper: int
@@ -112,7 +124,9 @@ def layout_of(scene: Scene) -> Layout:
     switch = gap + elements * columns * TERMS
     damper = switch + elements * TERMS * width
     size = damper + (elements * TERMS * width if scene.jumps else 0)
-    branches = 2**elements if scene.resolved else 1
+    sets = 2**elements if scene.resolved else 1
+    on_demand = int(sets > MOST_SETS_IN_ADVANCE)
+    branches = 1 if on_demand else sets
     bounds = -(-2 * waves // _VECTOR) * _VECTOR
     bound_size = -(-columns // _VECTOR) * _VECTOR
     header = bounds + elements * bound_size
@@ -125,6 +139,7 @@ def layout_of(scene: Scene) -> Layout:
         width=width,
         elements=elements,
         branches=branches,
+        on_demand=on_demand,
         gap=gap,
         switch=switch,
         damper=damper,
@@ -269,22 +284,27 @@ class MethodRows(NamedTuple):
         The factors of the map columns after the state: inputs and offsets.
     margins : int
         By how much each gap may deviate from its cubic in a step.
+    maps : int
+        Where the maps of the lane's branches begin, relative to the first ones of its block; only
+        if maps are made on demand.
     """
 
     inputs: int
     margins: int
+    maps: int
 
 
 def method_rows_of(scene: Scene) -> MethodRows:
     """Return the rows that flow maps use in a block."""
     place, first = layout_of(scene), rows_of(scene).method
-    return MethodRows(first, first + place.columns - place.states)
+    margins = first + place.columns - place.states
+    return MethodRows(first, margins, margins + place.elements)
 
 
 def rows_needed(scene: Scene) -> int:
     """Return the number of rows that flow maps use in a block."""
     place = layout_of(scene)
-    return place.columns - place.states + place.elements
+    return place.columns - place.states + place.elements + place.on_demand
 
 
 method_rows = constants(method_rows_of)

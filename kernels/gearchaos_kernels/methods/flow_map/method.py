@@ -10,7 +10,14 @@ from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import aligned_memory, slots_of
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.flow_map.crossings import resolve
-from gearchaos_kernels.methods.flow_map.layout import Work, aside_rows, layout, rows_needed
+from gearchaos_kernels.methods.flow_map.layout import (
+    Work,
+    aside_rows,
+    layout,
+    layout_of,
+    rows_needed,
+)
+from gearchaos_kernels.methods.flow_map.on_demand import shares_on_demand
 from gearchaos_kernels.methods.flow_map.steps import begin_lane, move_block
 from gearchaos_kernels.methods.flow_map.store import (
     fewest_steps,
@@ -36,6 +43,9 @@ def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
     refusal = system.refuses_maps()
     if refusal:
         raise ValueError(refusal)
+    if layout_of(scene).on_demand:
+        yield from shares_on_demand(system, plan, scene)
+        return
     lanes, steps, group = system.lanes, fewest_steps(plan), sharing(system)
     in_groups = np.argsort(group, kind="stable")
     _, first, counts = np.unique(group[in_groups], return_index=True, return_counts=True)
@@ -46,7 +56,8 @@ def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
         order = in_groups[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)
         steps_of[order] = np.repeat(places[0], lanes_of)
-        yield Share(order, cut(lanes_of, *places), maps, steps_of)
+        lacked = np.zeros(0, dtype=np.intp)
+        yield Share(order, cut(lanes_of, *places), maps, steps_of, lacked)
         done += lanes_of.size
 
 

@@ -126,24 +126,25 @@ def make_maps(matrices, elements_on, inputs, forcing, tables, tails, place):
     `differentiate`; ``elements_on``: its ``dampers``, and the stiffness of the elements as
     `Model.stiffness` returns it; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`,
     steps): Taylor coefficients of the stiffness variation and of the waves about the middle of
-    every step; ``place``: the `Layout`.
+    every step; ``place``: the `Layout`. ``elements_on`` begins with the sets of branches: whether
+    each element is engaged, 1 or 0, shape (lanes, sets in a step, elements).
     """
-    dampers, stiffness = elements_on
+    engaged, dampers, stiffness = elements_on
     for number in prange(tables.shape[0]):
         # The index of a parallel loop has another type; without the cast, two versions of
         # `fill_maps` are compiled.
         lane = np.int64(number)
-        of_lane = dampers[lane], stiffness[lane]
+        of_lane = engaged[lane], dampers[lane], stiffness[lane]
         tails[lane] = fill_maps(matrices[lane], of_lane, inputs, forcing, tables[lane], place)
 
 
 @part
 def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
-    dampers, stiffness = elements_on
+    sets, dampers, stiffness = elements_on
     tail = 0.0
     for number in range(place.branches):
-        engaged = 1.0 - (number >> np.arange(place.elements)) % 2
+        engaged = sets[number]
         damped = with_dampers(matrix, engaged, dampers)
         for first in range(0, table.shape[0], TOGETHER):
             some = table[first : first + TOGETHER]

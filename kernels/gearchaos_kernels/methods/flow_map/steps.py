@@ -13,6 +13,7 @@ from gearchaos_kernels.memory.rows import STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
+from gearchaos_kernels.methods.flow_map.sets import enter, number_of
 from gearchaos_kernels.models.interfaces import (
     forcing_at,
     gaps_at,
@@ -33,7 +34,7 @@ def points_of(maps, maps_at, scene):
 
 
 @scalar
-def begin_lane(memory, slot, lane, scene):
+def begin_lane(memory, slot, lane, given, scene):
     """Store the inputs of a lane and the offsets of its branches, in the order of map columns."""
     place, first = layout(scene), method_rows(scene).inputs
     inputs = inputs_of(lane, scene)
@@ -45,6 +46,8 @@ def begin_lane(memory, slot, lane, scene):
         store_offsets(memory, slot, lane, branches, scene)
     else:
         store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
+        if place.on_demand:
+            enter(memory, slot, given, scene)
 
 
 @scalar
@@ -66,12 +69,13 @@ def store_offsets(memory, slot, lane, branches, scene):
 
 
 @scalar
-def maps_on(branches, maps_at, scene):
-    """Return where the maps for a set of branches begin, among the maps of a step."""
-    number = 0
-    for element in range(layout(scene).elements):
-        number += 0 if branches[element].engaged != 0.0 else 1 << element
-    return maps_at + layout(scene).header + number * layout(scene).size
+def maps_on(memory, slot, maps_at, scene):
+    """Return where the maps for the branches of a lane begin, among the maps of a step."""
+    if layout(scene).on_demand:
+        offset = int(memory[method_rows(scene).maps * STRIDE + slot])
+    else:
+        offset = number_of(read_branches(memory, slot, scene), scene) * layout(scene).size
+    return maps_at + layout(scene).header + offset
 
 
 @scalar
@@ -102,7 +106,7 @@ def move_lane(memory, maps, maps_at, numbers, scene):
     vectors.bound_bends(memory, 0, maps, maps_at, scene)
     branch_maps_at = maps_at + place.header
     if scene.resolved is not None:
-        branch_maps_at = maps_on(read_branches(memory, 0, scene), maps_at, scene)
+        branch_maps_at = maps_on(memory, 0, maps_at, scene)
     scatter(memory, maps, branch_maps_at, numbers, scene)
     return count_suspects(memory, 1, maps, maps_at, scene)
 

@@ -50,6 +50,9 @@ MAKING, READING, MOVING = 11_000.0, 15.0, 2.5
 They are medians over scenes of two, six and ten states, with and without a tangent vector.
 """
 
+SETS_VISITED = 4
+"""Sets of branches that a motion visits, as an estimate, where maps are made on demand."""
+
 FEWEST_RECORDED = 240
 """Fewest steps per period if recorders read every step: they interpolate by parabolas."""
 
@@ -112,14 +115,17 @@ def _steps_needed(system: Any, plan: Plan, stable: Floats | NDArray[np.int64]) -
 def _sizes(system: Any, plan: Plan, scene: Scene, stable: Floats | NDArray[np.int64]) -> Floats:
     """Estimate the bytes of the maps of each group of lanes, shape (groups,)."""
     _, first = np.unique(sharing(system), return_index=True)
-    sizes: Floats = 8 * layout_of(scene).step_size * _steps_needed(system, plan, stable[first])
+    place = layout_of(scene)
+    sets = min(2**place.elements, SETS_VISITED) if place.on_demand else 1
+    sizes: Floats = 8.0 * sets * place.step_size * _steps_needed(system, plan, stable[first])
     return sizes
 
 
 class _Kept:
     """Computed maps in one table, one after the other, until no more fit.
 
-    ``places``: steps per period and place of the maps of a lane, by scene and parameters.
+    ``places``: steps per period and place of the maps of a lane, by scene and parameters; see
+    `on_demand` for those of single sets of branches.
     """
 
     def __init__(self, size: int) -> None:
@@ -178,26 +184,41 @@ def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
 
     If not even `MOST_MAP_STEPS` suffice, the maps are NaN.
     """
-    place, model = layout_of(scene), provider_of(scene.model)
-    inputs = np.ascontiguousarray(model.maps.inputs(scene.model))
-    system = system.of_unit_inputs()
+    place = layout_of(scene)
     made = [np.full((steps, place.step_size), np.nan)] * system.lanes
     left, count = np.arange(system.lanes), steps
     while left.size and count <= max(steps, MOST_MAP_STEPS):
-        coefficients = system.of(left).coefficients(system.mesh_period[left] / count)
-        tables, tails = np.zeros((left.size, count, place.step_size)), np.zeros(left.size)
-        edges = system.wave_values(2.0 * np.pi / count * np.arange(count + 1))
-        tables[:, :, : place.waves] = edges[:-1]
-        tables[:, :, place.waves : 2 * place.waves] = edges[1:]
-        width = place.states + 1 + place.waves + place.elements
-        matrices = np.zeros((left.size, place.states + place.elements, width))
-        dampers = np.zeros((left.size, place.elements, width - place.elements + 1))
-        differentiate(coefficients, matrices, dampers, scene)
-        elements_on = dampers, model.stiffness(scene.model, coefficients)
-        forcing = system.wave_series(count, ORDER)
-        make_maps(matrices, elements_on, inputs, forcing, tables, tails, place)
-        for number in np.flatnonzero(tails < TAIL):
+        sets = np.tile(np.arange(place.branches), (left.size, 1))
+        tables, converged, finite = make_tables(system.of(left), sets, count, scene)
+        for number in np.flatnonzero(converged):
             made[left[number]] = tables[number].copy()
-        left = left[~(tails < TAIL) & np.isfinite(coefficients).all(axis=1)]
+        left = left[~converged & finite]
         count *= 2
     return made
+
+
+def make_tables(
+    system: Any, sets: NDArray[np.intp], steps: int, scene: Scene
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Compute the maps of lanes for some sets of branches, ``sets`` (lanes, sets in a step).
+
+    Returns them, shape (lanes, steps, size of a step), whether the series of each lane converge,
+    and whether its coefficients are finite.
+    """
+    place, model = layout_of(scene), provider_of(scene.model)
+    inputs = np.ascontiguousarray(model.maps.inputs(scene.model))
+    system, lanes = system.of_unit_inputs(), system.lanes
+    coefficients = system.coefficients(system.mesh_period / steps)
+    tables, tails = np.zeros((lanes, steps, place.step_size)), np.zeros(lanes)
+    edges = system.wave_values(2.0 * np.pi / steps * np.arange(steps + 1))
+    tables[:, :, : place.waves] = edges[:-1]
+    tables[:, :, place.waves : 2 * place.waves] = edges[1:]
+    width = place.states + 1 + place.waves + place.elements
+    matrices = np.zeros((lanes, place.states + place.elements, width))
+    dampers = np.zeros((lanes, place.elements, width - place.elements + 1))
+    differentiate(coefficients, matrices, dampers, scene)
+    engaged = 1.0 - (sets[:, :, np.newaxis] >> np.arange(place.elements)) % 2
+    elements_on = engaged, dampers, model.stiffness(scene.model, coefficients)
+    forcing = system.wave_series(steps, ORDER)
+    make_maps(matrices, elements_on, inputs, forcing, tables, tails, place)
+    return tables, tails < TAIL, np.isfinite(coefficients).all(axis=1)

@@ -3,6 +3,9 @@
 Maps and switch terms are applied to eight lanes at once, with the same map for all of them
 (`move`). For the only lane of a block, vectors run along the state instead: its map is a sum of
 columns (`_combination`).
+
+Where maps are made on demand, there are more than two elements, and often many states. Their code
+is then a loop over states, elements or terms, because it would be too long to compile otherwise.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,9 +23,6 @@ from gearchaos_kernels.scene import Scene, provider_of
 
 _DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
 _FLAGS = tuple(sorted(FASTMATH))
-
-_MOST_UNROLLED = 4
-"""Largest number of sets of branches whose code is written once for each of them."""
 
 
 def _inputs(scene: Scene) -> list[int]:
@@ -52,6 +52,10 @@ class _Writer:
         first = first_element(self.context, self.builder, kind, array)
         return self.builder.gep(first, [at])
 
+    def moved(self, pointer: Any, count: Any, stride: int = 1) -> Any:
+        """Return an address, count * stride numbers further; ``count`` is known at run time."""
+        return self.builder.gep(pointer, [self.builder.mul(count, _INTEGER(stride))])
+
     def load(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
         """Load a vector that begins ``at`` numbers after an address."""
         kind = ir.VectorType(_DOUBLE, width).as_pointer()
@@ -78,6 +82,22 @@ class _Writer:
         given = self.load(vector, row * STRIDE)
         return self.builder.fcmp_ordered("==", given, self.constant(number))
 
+    def bits(self, mask: Any) -> Any:
+        """Return a mask of eight lanes as an integer, a bit for each of them."""
+        return self.builder.bitcast(mask, ir.IntType(VECTOR))
+
+    def any(self, mask: Any) -> Any:
+        """Return whether a mask contains any of eight lanes."""
+        bits = self.bits(mask)
+        return self.builder.icmp_unsigned("!=", bits, bits.type(0))
+
+    def suspects(self, sums: Any, element: Any) -> Any:
+        """Return the mask of the lanes in which an element is a suspect; see `Rows.suspect`."""
+        numbers = self.builder.fptoui(sums, ir.VectorType(_INTEGER, VECTOR))
+        bit = self.splat(self.builder.shl(_INTEGER(1), element), of=_INTEGER)
+        found = self.builder.and_(numbers, bit)
+        return self.builder.icmp_unsigned("!=", found, ir.Constant(found.type, None))
+
     def on_branches(self, number: Any, engaged: Sequence[Any]) -> Any:
         """Return the mask of those of eight lanes that are on a set of branches.
 
@@ -97,9 +117,9 @@ class _Writer:
         """Load a number and return a vector whose components all equal it."""
         return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
 
-    def splat(self, number: Any, width: int = VECTOR) -> Any:
+    def splat(self, number: Any, width: int = VECTOR, of: Any = _DOUBLE) -> Any:
         """Return a vector whose components all equal a number."""
-        nothing = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
+        nothing = ir.Constant(ir.VectorType(of, width), ir.Undefined)
         first = self.builder.insert_element(nothing, number, _INDEX(0))
         order = ir.Constant(ir.VectorType(_INDEX, width), [_INDEX(0)] * width)
         return self.builder.shuffle_vector(first, nothing, order)
@@ -170,6 +190,19 @@ def bound_bends(_typing, memory, slot, maps, maps_at, scene):
     """Store by how much the gaps of eight lanes may deviate from their cubics in a step."""
     place, margins = layout_of(scene.scene), method_rows_of(scene.scene).margins
 
+    def apply(w, vector, branch_maps, mask):
+        header = w.builder.gep(branch_maps, [_INTEGER(-place.header)])
+        sizes = [w.size(given) for given in w.rows(vector, _inputs(scene.scene))]
+        with for_range(w.builder, _INTEGER(place.elements)) as loop:
+            bounds = w.moved(header, loop.index, place.bound_size)
+            bends = [w.spread(bounds, place.bounds + column) for column in range(len(sizes))]
+            value = w.sum(enumerate(bends), sizes)
+            w.put(value, w.moved(vector, loop.index, STRIDE), margins, mask)
+
+    given = memory, types.intp, maps, types.intp, scene
+    if place.on_demand:
+        return types.void(*given), _on_branches(scene.scene, apply)
+
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         vector, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
@@ -181,7 +214,7 @@ def bound_bends(_typing, memory, slot, maps, maps_at, scene):
                 w.store(w.sum(enumerate(bends), sizes), vector, (margins + element) * STRIDE)
         return context.get_dummy_value()
 
-    return types.void(memory, types.intp, maps, types.intp, scene), generate
+    return types.void(*given), generate
 
 
 def _on_branches(scene: Scene, apply: Any) -> Any:
@@ -192,6 +225,8 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
     on these branches, None for all.
     """
     place, first = layout_of(scene), rows_of(scene).branches
+    if place.on_demand:
+        return _on_own_maps(scene, apply)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
@@ -204,17 +239,45 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
         def apply_on(number):
             engaged = [w.load(vector, (first + BRANCH * n) * STRIDE) for n in range(place.elements)]
             mask = w.on_branches(number, engaged)
-            bits = builder.bitcast(mask, ir.IntType(VECTOR))
-            with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
+            with builder.if_then(w.any(mask)):
                 at = builder.add(maps, builder.mul(number, _INTEGER(place.size)))
                 apply(w, vector, w.element(2, at), mask)
 
-        if place.branches <= _MOST_UNROLLED:
-            for number in range(place.branches):
-                apply_on(_INTEGER(number))
-        else:
-            with for_range(builder, _INTEGER(place.branches)) as loop:
-                apply_on(loop.index)
+        for number in range(place.branches):
+            apply_on(_INTEGER(number))
+        return context.get_dummy_value()
+
+    return generate
+
+
+def _on_own_maps(scene: Scene, apply: Any) -> Any:
+    """Return the same body as `_on_branches` where lanes know the place of their maps.
+
+    All lanes with the place of the first one are served, then those with the place of the first one
+    left, and so on.
+    """
+    place, row = layout_of(scene), method_rows_of(scene).maps
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        vector = w.element(0, arguments[1])
+        places = w.load(vector, row * STRIDE)
+        every = ir.IntType(VECTOR)(2**VECTOR - 1)
+        waiting = builder.alloca(every.type)
+        builder.store(every, waiting)
+        body, done = builder.append_basic_block(), builder.append_basic_block()
+        builder.branch(body)
+        builder.position_at_end(body)
+        left = builder.load(waiting)
+        lane = builder.zext(builder.cttz(left, ir.IntType(1)(1)), _INTEGER)
+        own = builder.load(builder.gep(vector, [builder.add(lane, _INTEGER(row * STRIDE))]))
+        mask = builder.fcmp_ordered("==", places, w.splat(own))
+        left = builder.and_(left, builder.not_(w.bits(mask)))
+        builder.store(left, waiting)
+        at = builder.add(arguments[3], builder.fptosi(own, _INTEGER))
+        apply(w, vector, w.element(2, builder.add(at, _INTEGER(place.header))), mask)
+        builder.cbranch(builder.icmp_unsigned("!=", left, left.type(0)), body, done)
+        builder.position_at_end(done)
         return context.get_dummy_value()
 
     return generate
@@ -229,19 +292,31 @@ def move(_typing, memory, slot, maps, maps_at, scene):
     states, elements = model.maps.apart(scene.scene.model)
     columns = {*states, *(place.states + 1 + element for element in elements)}
 
-    def apply(w, vector, branch_maps, mask):
+    def inputs_of(w, vector):
         given = {STATE: w.rows(vector, _inputs(scene.scene))}
         if scene.scene.tangent is not None:
             given[at.tangent] = w.rows(vector, _tangent_inputs(scene.scene))
+        return given
+
+    def apply(w, vector, branch_maps, mask):
+        given = inputs_of(w, vector)
+        if place.on_demand:
+            with for_range(w.builder, _INTEGER(place.states)) as loop:
+                line_maps = w.moved(branch_maps, loop.index)
+                line_of_lanes = w.moved(vector, loop.index, STRIDE)
+                compute(w, given, line_maps, range(place.columns), (line_of_lanes, mask))
+            return
         for line in range(place.states):
-            factors = [
-                (column, w.spread(branch_maps, column * place.width + line))
-                for column in range(place.columns)
-                if line in states or column not in columns
-            ]
-            for target, inputs in given.items():
-                value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
-                w.put(value, vector, target + line, mask)
+            acting = [n for n in range(place.columns) if line in states or n not in columns]
+            lines = w.builder.gep(branch_maps, [_INTEGER(line)])
+            line_of_lanes = w.builder.gep(vector, [_INTEGER(line * STRIDE)])
+            compute(w, given, lines, acting, (line_of_lanes, mask))
+
+    def compute(w, given, line_maps, acting, lanes):
+        factors = [(column, w.spread(line_maps, column * place.width)) for column in acting]
+        for target, inputs in given.items():
+            value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
+            w.put(value, lanes[0], target, lanes[1])
 
     given = memory, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
@@ -249,24 +324,39 @@ def move(_typing, memory, slot, maps, maps_at, scene):
 
 @intrinsic
 def compute_gaps(_typing, aside, slot, maps, maps_at, scene):
-    """Store the terms of all gaps of eight lanes along the step, without their constant parts."""
+    """Store the terms of the gaps of eight lanes along the step, without their constant parts.
+
+    Where maps are made on demand, those of suspects only.
+    """
     place, at = layout_of(scene.scene), aside_of(scene.scene)
+    suspect = rows_of(scene.scene).suspect
 
     def apply(w, vector, branch_maps, mask):
         given = {0: w.rows(vector, _inputs(scene.scene))}
         if scene.scene.tangent is not None:
             given[at.tangent_terms] = w.rows(vector, _tangent_inputs(scene.scene))
+        gaps = w.builder.gep(branch_maps, [_INTEGER(place.gap)])
+        rows = w.builder.gep(vector, [_INTEGER(at.gaps * STRIDE)])
+        if place.on_demand:
+            with for_range(w.builder, _INTEGER(place.elements)) as loop:
+                suspects = w.suspects(w.load(vector, suspect * STRIDE), loop.index)
+                with w.builder.if_then(w.any(w.builder.and_(suspects, mask))):
+                    terms = w.moved(gaps, loop.index, place.columns * TERMS)
+                    first = w.moved(rows, loop.index, at.gap_rows * STRIDE)
+                    with for_range(w.builder, _INTEGER(TERMS)) as term:
+                        row = w.moved(first, term.index, STRIDE)
+                        compute(w, given, w.moved(terms, term.index), (row, mask))
+            return
         for element in range(place.elements):
-            first = place.gap + element * place.columns * TERMS
             for term in range(TERMS):
-                factors = [
-                    (column, w.spread(branch_maps, first + column * TERMS + term))
-                    for column in range(place.columns)
-                ]
-                for target, inputs in given.items():
-                    value = w.sum(factors[: len(inputs)], inputs)
-                    row = at.gaps + element * at.gap_rows + target + term
-                    w.put(value, vector, row, mask)
+                terms = w.builder.gep(gaps, [_INTEGER(element * place.columns * TERMS + term)])
+                row = w.builder.gep(rows, [_INTEGER((element * at.gap_rows + term) * STRIDE)])
+                compute(w, given, terms, (row, mask))
+
+    def compute(w, given, terms, lanes):
+        factors = [(column, w.spread(terms, column * TERMS)) for column in range(place.columns)]
+        for target, inputs in given.items():
+            w.put(w.sum(factors[: len(inputs)], inputs), lanes[0], target, lanes[1])
 
     given = aside, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
@@ -289,21 +379,34 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
         if scene.scene.tangent is not None:
             sums = range(at.tangent_sums, at.tangent_sums + count)
             given[block.tangent_before] = w.rows(vector, sums)
+        if place.on_demand:
+            elements = w.load(vector, at.element * STRIDE)
+            with for_range(w.builder, _INTEGER(place.elements)) as loop:
+                number = w.splat(w.builder.sitofp(loop.index, _DOUBLE))
+                those = w.builder.and_(mask, w.builder.fcmp_ordered("==", elements, number))
+                with w.builder.if_then(w.any(those)):
+                    terms = w.moved(branch_maps, loop.index, TERMS * place.width)
+                    with for_range(w.builder, _INTEGER(place.states)) as line:
+                        row = w.moved(vector, line.index, STRIDE)
+                        add(w, given, (w.moved(terms, line.index), parts), (row, those))
+            return
         for element in range(place.elements):
             those = mask
             if place.elements > 1:
                 those = w.builder.and_(mask, w.equal(vector, at.element, float(element)))
-            starts = [
-                part + (element * TERMS + k) * place.width for part in parts for k in range(TERMS)
-            ]
             for line in range(place.states):
-                factors = [
-                    (k, w.spread(branch_maps, start + line)) for k, start in enumerate(starts)
-                ]
-                for target, sums in given.items():
-                    before = w.load(vector, (target + line) * STRIDE)
-                    value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
-                    w.put(value, vector, target + line, those)
+                terms = w.builder.gep(branch_maps, [_INTEGER(element * TERMS * place.width + line)])
+                row = w.builder.gep(vector, [_INTEGER(line * STRIDE)])
+                add(w, given, (terms, parts), (row, those))
+
+    def add(w, given, maps, lanes):
+        terms, parts = maps
+        starts = [part + k * place.width for part in parts for k in range(TERMS)]
+        factors = [(k, w.spread(terms, start)) for k, start in enumerate(starts)]
+        for target, sums in given.items():
+            before = w.load(lanes[0], target * STRIDE)
+            value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
+            w.put(value, lanes[0], target, lanes[1])
 
     given = aside, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
@@ -367,6 +470,7 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
     copied += range(at.branches, at.branches + BRANCH * place.elements)
     copied += [at.suspect]
     copied += range(forced.inputs, forced.inputs + place.columns - place.states)
+    copied += [forced.maps] * place.on_demand
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)

@@ -46,7 +46,8 @@ def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
     """Yield all lanes as one share: RK4 prepares nothing for them."""
     lanes, steps = system.lanes, plan.steps_per_period
     blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
-    yield Share(np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps))
+    nothing, every = np.zeros(0), np.full(lanes, steps)
+    yield Share(np.arange(lanes), blocks, nothing, every, np.zeros(0, dtype=np.intp))
 
 
 def work(system: Any, plan: Plan, stable: NDArray[np.int64]) -> float:
@@ -68,7 +69,7 @@ def workspace(scene):
 
 
 @scalar
-def begin_lane(memory, slot, lane, scene):
+def begin_lane(memory, slot, lane, given, scene):
     """Prepare nothing."""
 
 

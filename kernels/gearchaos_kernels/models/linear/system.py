@@ -13,8 +13,11 @@ from gearchaos_kernels.models.linear.structure import MATRICES, Structure, entri
 from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
 from gearchaos_kernels.plan import Floats
 
-MOST_MAPPED = 4
-"""Largest number of clearance elements of a system that flow maps integrate."""
+MOST_MAPPED = 52
+"""Largest number of clearance elements of a system that flow maps integrate.
+
+A double represents sets of as many elements, 2**j for element j, without rounding.
+"""
 
 
 @dataclass(frozen=True)
@@ -188,8 +191,7 @@ class LinearSystems(LaneSystem):
         elements = self.gap.shape[1]
         if elements > MOST_MAPPED:
             return (
-                f"a system with {elements} clearance elements would need maps for {2**elements} "
-                f"sets of contact branches; flow maps take up to {MOST_MAPPED} elements"
+                f"flow maps take up to {MOST_MAPPED} clearance elements; this system has {elements}"
             )
         return ""
 
