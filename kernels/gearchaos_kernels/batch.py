@@ -131,6 +131,7 @@ def _integrate_share(
         share.blocks,
         share.maps,
         share.lacked,
+        share.progress,
         chosen,
         np.stack([np.cos(phases), np.sin(phases)], axis=2),
     )
@@ -139,10 +140,12 @@ def _integrate_share(
         plan.transient_periods,
         plan.recorded_periods,
         plan.first_period,
-        more_rows=2 * (chosen.size - 1 + chosen.size * orders.size),
+        plan.more_rows,
     )
-    # Lanes that lacked maps were stopped in an earlier share.
-    outcome.status[share.order], outcome.diverged_period[share.order] = Status.OK, -1
+    if share.progress.size:
+        # Blocks may have begun before, with fewer steps.
+        anew = share.order[np.repeat(share.progress[:, 0] == 0.0, share.blocks[:, 1])]
+        outcome.status[anew], outcome.diverged_period[anew] = Status.OK, -1
     tables, next_block = system.tables(plan.steps_per_period), np.zeros(1, dtype=np.intp)
     _integrate_blocks(get_num_threads(), next_block, batch, tables, schedule, outcome, scene)
     if share.maps.size:

@@ -17,6 +17,7 @@ from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill,
     fill_lane,
+    read_lane,
     slots_of,
     state_of,
     store,
@@ -78,7 +79,7 @@ class Batch(NamedTuple):
         State and tangent vector at tau = 0, in the units of the equations.
     steps_between_scalings : array of int, shape (lanes,)
         Steps between two scalings of a tangent vector to length 1.
-    order, blocks, maps, lacked : array
+    order, blocks, maps, lacked, progress : array
         See `methods.protocol.Share`.
     chosen : array of int, shape (states + 1,)
         Rows of the states whose extremes are recorded, then the row of the observed signal.
@@ -95,6 +96,7 @@ class Batch(NamedTuple):
     blocks: NDArray[np.intp]
     maps: NDArray[np.float64]
     lacked: NDArray[np.intp]
+    progress: NDArray[np.float64]
     chosen: NDArray[np.intp]
     turns: NDArray[np.float64]
 
@@ -113,9 +115,11 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
     substeps = steps // plan.steps_per_period
     interval = begin(memory, block, batch, given, plan.first_period, scene)
     periods = plan.transient_periods + plan.recorded_periods
-    if all_stopped(lacked):
+    if any_stopped(lacked):
         return
-    for period in range(periods):
+    progress = batch.progress[number_of_block : number_of_block + 1]
+    for period in range(resumed(memory, block, progress, given, scene), periods):
+        keep_progress(memory, block, progress, period, scene)
         recorded = period - plan.transient_periods
         clock = Clock(period, 0, steps, substeps, recorded, periods - 1 - period)
         begin_record(memory, block, clock, records, scene)
@@ -125,7 +129,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
             if scene.resolved is not None:
                 if suspects > 0:
                     resolve(memory, lanes, at, given, scene)
-                    if all_stopped(lacked):
+                    if any_stopped(lacked):
                         return
             clock = Clock(period, number, steps, substeps, recorded, periods - 1 - period)
             record_step(memory, block, clock, records, scene)
@@ -141,12 +145,47 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
 
 
 @scalar
-def all_stopped(lacked):
-    """Return whether every lane of a block lacks maps, so that nothing of it is of use."""
+def any_stopped(lacked):
+    """Return whether some lane of a block lacks maps."""
     stopped = 0
     for number in lacked:
         stopped += 1 if number >= 0 else 0
-    return (stopped > 0) & (stopped == lacked.shape[0])
+    return stopped > 0
+
+
+@scalar
+def resumed(memory, block, progress, given, scene):
+    """Restore the memory of a block that was stopped; return the period in which it continues.
+
+    ``progress``, shape (1 or 0, numbers): its row of `Share.progress`, if there is one.
+    """
+    if progress.shape[0] == 0:
+        return 0
+    period = int(progress[0, 0])
+    if period > 0:
+        copy_progress(progress[0, 1:], memory, block, scene)
+        for slot in range(LANES):
+            # Its maps may have moved.
+            begin_lane(memory, slot, read_lane(memory, slot, scene), given, scene)
+    return period
+
+
+@scalar
+def keep_progress(memory, block, progress, period, scene):
+    """Keep the memory of a block at the beginning of a period, if its method may stop it."""
+    if progress.shape[0] > 0:
+        progress[0, 0] = period
+        copy_progress(memory, progress[0, 1:], block, scene)
+
+
+@scalar
+def copy_progress(source, target, block, scene):
+    """Copy the memory of a block, except for coefficients, which are constant."""
+    for row in range(source.shape[0] // STRIDE):
+        if rows(scene).coefficients <= row < rows(scene).branches:
+            continue
+        for slot in range(slots_of(block.lanes)):
+            target[row * STRIDE + slot] = source[row * STRIDE + slot]
 
 
 @scalar

@@ -77,6 +77,12 @@ class Plan(NamedTuple):
         """Whether recorders read every step; flow maps then take shorter steps."""
         return bool(self.loads or self.states or self.orders)
 
+    @property
+    def more_rows(self) -> int:
+        """Rows of a block beyond those of the scene, for extremes and amplitudes."""
+        states = len(self.states)
+        return 2 * (states + (states + 1) * len(self.orders))
+
 
 class Schedule(NamedTuple):
     """The part of a plan that the compiled loop over the periods reads.

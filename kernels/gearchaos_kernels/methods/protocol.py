@@ -29,15 +29,20 @@ class Share(NamedTuple):
     steps : array of int, shape (lanes,)
         Steps per mesh period of every lane, including those of other shares.
     lacked : array of int, shape (lanes of the share,) or (0,)
-        The loop writes here, in the order of ``order``, for which set of branches a lane lacks
-        maps, -1 for none. The method yields such lanes again in a later share.
+        In the order of ``order``. A lane that needs maps of a set of branches that has none writes
+        the number of the set here, and its block stops; all others keep -1. The method yields
+        stopped blocks again in a later share.
+    progress : array, shape (blocks, numbers) or (0, 0)
+        The mesh period in which a block begins, and its memory then. Blocks write it at the
+        beginning of every period. Those with 0 begin at tau = 0.
     """
 
     order: Integers
     blocks: Integers
     maps: Floats
     steps: Integers
-    lacked: Integers
+    lacked: Integers = np.zeros(0, dtype=np.intp)
+    progress: Floats = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch,
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
-from gearchaos_kernels.methods.flow_map.sets import KNOWN, enter, find_maps, report, stop_lane
+from gearchaos_kernels.methods.flow_map.sets import KNOWN, enter, find_maps, report
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
 from gearchaos_kernels.models.protocol import Gap
 
@@ -75,7 +75,7 @@ def cross_together(memory, slots, at, given, scene):
         if aside[rows(scene).suspect * STRIDE + n] != 0.0:
             give_up(memory, slots[n], maps, maps_at, scene)
         if place.on_demand:
-            enter_or_stop(memory, slots[n], given, scene)
+            enter(memory, slots[n], given, scene)
 
 
 @scalar
@@ -94,14 +94,6 @@ def share_maps(aside, lanes, scene):
     first = method_rows(scene).maps * STRIDE
     for n in range(lanes, VECTOR):
         aside[first + n] = aside[first]
-
-
-@scalar
-def enter_or_stop(memory, slot, given, scene):
-    """Find the maps of the branches of a lane after a step; stop it if it has lacked some."""
-    enter(memory, slot, given, scene)
-    if given.lacked[slot] != KNOWN:
-        stop_lane(memory, slot, scene)
 
 
 @scalar

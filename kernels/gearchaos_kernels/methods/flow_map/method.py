@@ -56,8 +56,7 @@ def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
         order = in_groups[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)
         steps_of[order] = np.repeat(places[0], lanes_of)
-        lacked = np.zeros(0, dtype=np.intp)
-        yield Share(order, cut(lanes_of, *places), maps, steps_of, lacked)
+        yield Share(order, cut(lanes_of, *places), maps, steps_of)
         done += lanes_of.size
 
 

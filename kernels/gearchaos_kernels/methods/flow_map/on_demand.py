@@ -1,10 +1,10 @@
 """Shares of lanes whose maps are made on demand: for the sets of branches that lanes enter.
 
-Every lane begins with the maps of the set on which all elements are engaged. Where it enters a set
-without maps, it stops (`sets`); the maps are made, and it begins anew. Motions visit few sets, and
-most of them in their first periods, so that little is computed twice. If the series of a set do not
-converge, the lanes that enter it begin anew with twice as many steps. Steps and result of a lane
-therefore depend neither on other lanes nor on the order in which maps are made.
+Every lane begins with the maps of the set on which all elements are engaged. Where a lane enters a
+set without maps, its block stops (`sets`); the maps are made, and the block continues from the
+beginning of that mesh period. If the series of a set do not converge, the lanes that enter it begin
+anew with twice as many steps, and the others of their block with as many as before. Steps and
+result of a lane therefore depend neither on other lanes nor on the order in which maps are made.
 """
 
 from collections import deque
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos_kernels.memory.rows import LANES, STRIDE, rows_of
 from gearchaos_kernels.methods.flow_map.layout import layout_of
 from gearchaos_kernels.methods.flow_map.sets import KNOWN
 from gearchaos_kernels.methods.flow_map.store import (
@@ -28,6 +29,9 @@ from gearchaos_kernels.methods.protocol import Integers, Share, cut
 from gearchaos_kernels.plan import MAP_BYTES, Floats, Plan
 from gearchaos_kernels.scene import Scene
 from gearchaos_kernels.turns import in_turn
+
+MOST_BLOCKS = 64
+"""Largest number of blocks of a group, whose memory is kept when they stop."""
 
 _ENGAGED = (0,)
 """The set of branches on which all elements are engaged: the first one that has maps."""
@@ -52,28 +56,38 @@ class _Group:
     sets : tuple of int
         Sets of branches whose maps they need, as far as known.
     lacked : array of int, shape (lanes,)
-        The set for which each lane has stopped, `KNOWN` before its first start.
+        The set for which each lane has stopped, `KNOWN` for none.
+    progress : array, shape (blocks, numbers)
+        See `Share`.
     """
 
     lanes: Integers
     steps: int
     sets: tuple[int, ...]
     lacked: Integers
+    progress: Floats
 
     @classmethod
-    def at_start(cls, lanes: Integers, steps: int) -> "_Group":
-        """Return a group of lanes that have not been started with so many steps."""
-        return cls(lanes, steps, _ENGAGED, np.full(lanes.size, KNOWN))
+    def at_start(cls, lanes: Integers, steps: int, rows: int) -> "_Group":
+        """Return a group of lanes at tau = 0; ``rows``: number of rows of a block."""
+        progress = np.zeros((-(-lanes.size // LANES), 1 + rows * STRIDE))
+        return cls(lanes, steps, _ENGAGED, np.full(lanes.size, KNOWN), progress)
 
-    def of(self, chosen: NDArray[np.bool_]) -> "_Group":
-        """Return the group of some of its lanes."""
-        return replace(self, lanes=self.lanes[chosen], lacked=self.lacked[chosen])
+    def again(self, chosen: NDArray[np.bool_]) -> "_Group":
+        """Return the group of some of its lanes at tau = 0, the same group if it is all of them."""
+        if chosen.all():
+            return self
+        rows = self.progress.shape[1] // STRIDE
+        return replace(self.at_start(self.lanes[chosen], self.steps, rows), sets=self.sets)
 
-    def stopped(self, lacked: Integers) -> "_Group":
-        """Return the lanes that have stopped, with the sets ``lacked`` (lanes,) that they need."""
-        stopped = lacked != KNOWN
-        sets = sorted({*self.sets, *lacked[stopped].tolist()})
-        return replace(self, lacked=lacked, sets=tuple(sets)).of(stopped)
+    def stopped(self, lacked: Integers, progress: Floats) -> "_Group":
+        """Return the blocks that have stopped, which need the sets ``lacked`` (lanes,)."""
+        sets = sorted({*self.sets, *lacked.tolist()} - {KNOWN})
+        block = np.arange(lacked.size) // LANES
+        left = np.bincount(block, lacked != KNOWN) > 0
+        # All blocks but the last one are full, so those that are left keep their lanes.
+        lanes = self.lanes[left[block]]
+        return _Group(lanes, self.steps, tuple(sets), lacked[left[block]], progress[left])
 
     def size(self, scene: Scene) -> int:
         """Return the size of the maps that its lanes will probably need, in numbers."""
@@ -83,10 +97,8 @@ class _Group:
 
 def shares_on_demand(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
     """Yield shares of lanes until none of them has stopped for lack of maps."""
-    steps, numbers = fewest_steps(plan), sharing(system)
-    in_groups = np.argsort(numbers, kind="stable")
-    _, first = np.unique(numbers[in_groups], return_index=True)
-    waiting = deque(_Group.at_start(lanes, steps) for lanes in np.split(in_groups, first[1:]))
+    steps, rows = fewest_steps(plan), rows_of(scene).total + plan.more_rows
+    waiting = deque(_Group.at_start(lanes, steps, rows) for lanes in _sharing_lanes(system))
     steps_of = np.full(system.lanes, steps)
     while waiting:
         groups = _as_many_as_fit(waiting, plan.map_bytes, scene)
@@ -94,22 +106,43 @@ def shares_on_demand(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
         ready = []
         for group, found in zip(groups, places, strict=True):
             slow, moving = _by_convergence(group, found)
-            if slow.lanes.size:
-                finer = _Group.at_start(slow.lanes, 2 * group.steps)
-                if finer.steps <= max(steps, MOST_MAP_STEPS):
-                    waiting.appendleft(finer)
+            if slow.size:
+                if 2 * group.steps <= max(steps, MOST_MAP_STEPS):
+                    waiting.appendleft(_Group.at_start(slow, 2 * group.steps, rows))
                 else:
-                    yield _without_maps(slow.lanes, steps, steps_of, scene)
+                    yield _without_maps(slow, steps, steps_of, scene)
             if moving.lanes.size:
                 steps_of[moving.lanes] = group.steps
                 ready.append((moving, found))
         if ready:
             share = _share_of(ready, table, steps_of)
             yield share
-            ends = np.cumsum([group.lanes.size for group, _ in ready])
-            parts = np.split(share.lacked, ends[:-1])
-            again = [group.stopped(part) for (group, _), part in zip(ready, parts, strict=True)]
-            waiting.extendleft(group for group in again if group.lanes.size)
+            waiting.extendleft(_stopped([group for group, _ in ready], share))
+
+
+def _sharing_lanes(system: Any) -> list[Integers]:
+    """Return the numbers of the lanes that share their maps, up to `MOST_BLOCKS` blocks of them."""
+    numbers = sharing(system)
+    in_groups = np.argsort(numbers, kind="stable")
+    _, first = np.unique(numbers[in_groups], return_index=True)
+    most = MOST_BLOCKS * LANES
+    return [
+        lanes[at : at + most]
+        for lanes in np.split(in_groups, first[1:])
+        for at in range(0, lanes.size, most)
+    ]
+
+
+def _stopped(groups: list[_Group], share: Share) -> Iterator[_Group]:
+    """Yield the blocks of each group that have stopped in a share."""
+    lane = block = 0
+    for group in groups:
+        lanes = slice(lane, lane + group.lanes.size)
+        blocks = slice(block, block + len(group.progress))
+        stopped = group.stopped(share.lacked[lanes], share.progress[blocks])
+        if stopped.lanes.size:
+            yield stopped
+        lane, block = lanes.stop, blocks.stop
 
 
 def _as_many_as_fit(waiting: deque[_Group], map_bytes: int, scene: Scene) -> list[_Group]:
@@ -122,13 +155,13 @@ def _as_many_as_fit(waiting: deque[_Group], map_bytes: int, scene: Scene) -> lis
     return groups
 
 
-def _by_convergence(group: _Group, found: Places) -> tuple[_Group, _Group]:
-    """Split a group into lanes that need a set whose series do not converge, and all others."""
+def _by_convergence(group: _Group, found: Places) -> tuple[Integers, _Group]:
+    """Return the lanes that need a set whose series do not converge, and a group of the others."""
     slow = np.full(group.lanes.size, found[0] == _DIVERGES)
     for number, place in found.items():
         if place == _DIVERGES:
             slow |= group.lacked == number
-    return group.of(slow), group.of(~slow)
+    return group.lanes[slow], group.again(~slow)
 
 
 def _share_of(ready: list[tuple[_Group, Places]], table: Floats, steps_of: Integers) -> Share:
@@ -144,7 +177,8 @@ def _share_of(ready: list[tuple[_Group, Places]], table: Floats, steps_of: Integ
         row[: 2 * len(sets)] = np.ravel(sets)
     order = np.concatenate([group.lanes for group, _ in ready])
     about = np.ascontiguousarray(np.hstack([blocks, known[of_block]]))
-    return Share(order, about, table, steps_of, np.full(order.size, KNOWN))
+    progress = np.concatenate([group.progress for group, _ in ready])
+    return Share(order, about, table, steps_of, np.full(order.size, KNOWN), progress)
 
 
 def _without_maps(lanes: Integers, steps: int, steps_of: Integers, scene: Scene) -> Share:
@@ -152,7 +186,7 @@ def _without_maps(lanes: Integers, steps: int, steps_of: Integers, scene: Scene)
     blocks = cut(np.array([lanes.size]), np.array([steps]), np.array([0]))
     steps_of[lanes] = steps
     maps = np.full(steps * layout_of(scene).step_size, np.nan)
-    return Share(lanes, blocks, maps, steps_of, np.zeros(0, dtype=np.intp))
+    return Share(lanes, blocks, maps, steps_of)
 
 
 class _Kept:

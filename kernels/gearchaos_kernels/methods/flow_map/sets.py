@@ -1,17 +1,14 @@
-"""Sets of branches whose maps are made on demand: look them up, and stop lanes that lack them.
+"""Sets of branches whose maps are made on demand: look them up, and report those without.
 
 A set is numbered by the elements that are not engaged: element j adds 2**j. Both flanks of an
-element share their maps. A block knows for some sets where their maps begin. A lane that enters
-any other set stops: its state becomes NaN, and its block reports the set. The caller then makes
-the maps and integrates the lane again from its start, so that its result is the same whichever
-maps had been made before.
+element share their maps. A block knows for some sets where their maps begin. When a lane enters any
+other set, the lane reports it and the block stops. The maps are then made, and the block continues
+from the beginning of the mesh period, so that results are the same whichever maps had been there.
 """
-
-import math
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.block_memory import read_branches
-from gearchaos_kernels.memory.rows import STATE, STRIDE, rows
+from gearchaos_kernels.memory.rows import STRIDE
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows
 
 KNOWN = -1
@@ -29,7 +26,7 @@ def number_of(branches, scene):
 
 @scalar
 def find_maps(memory, slot, given, scene):
-    """Store where the maps of a lane's branches begin; return the set if it has none, or `KNOWN`."""
+    """Store where the maps of a lane begin; return its set if that has none, otherwise `KNOWN`."""
     number = number_of(read_branches(memory, slot, scene), scene)
     for at in range(0, given.sets.shape[0], 2):
         if given.sets[at] == number:
@@ -47,18 +44,9 @@ def report(slot, number, given):
 
 
 @scalar
-def stop_lane(memory, slot, scene):
-    """Turn state and tangent vector of a lane into NaN."""
-    for line in range(layout(scene).states):
-        memory[(STATE + line) * STRIDE + slot] = math.nan
-        memory[(rows(scene).tangent + line) * STRIDE + slot] = math.nan
-
-
-@scalar
 def enter(memory, slot, given, scene):
-    """Find the maps of the branches on which a lane begins; stop the lane if there are none."""
+    """Find the maps of the branches of a lane; report their set if there are none."""
     number = find_maps(memory, slot, given, scene)
     if number != KNOWN:
         memory[method_rows(scene).maps * STRIDE + slot] = 0.0
         report(slot, number, given)
-        stop_lane(memory, slot, scene)

@@ -46,8 +46,7 @@ def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
     """Yield all lanes as one share: RK4 prepares nothing for them."""
     lanes, steps = system.lanes, plan.steps_per_period
     blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
-    nothing, every = np.zeros(0), np.full(lanes, steps)
-    yield Share(np.arange(lanes), blocks, nothing, every, np.zeros(0, dtype=np.intp))
+    yield Share(np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps))
 
 
 def work(system: Any, plan: Plan, stable: NDArray[np.int64]) -> float:
