@@ -2,15 +2,18 @@
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, integrate, jacobian
+from gearchaos_kernels import Plan, Status, integrate, jacobian
+from gearchaos_kernels.methods.flow_map import on_demand
 from gearchaos_kernels.models.linear.system import LinearSystems
 
 from .oscillator import Oscillators
 from .piecewise import alternating, lanes_of, random_machine
+from .reference import assert_same_bits, lanes_out_of
 
-SIZES = [(1, 1), (3, 2), (6, 4)]
+SIZES = [(1, 1), (3, 2), (6, 6)]
 PERIODS = 3
 
 
@@ -128,7 +131,7 @@ def test_flow_maps_are_exact_where_elements_of_every_kind_cross(exact):
 
 def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(exact):
     machines, start, _, _, _ = exact
-    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, method="flow_map")
+    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
     # The same maps for many lanes, which move eight at a time, and for one.
     system = lanes_of(machines[:1] * 9)
     starts = start[0] * np.linspace(0.5, 1.0, 9)[:, np.newaxis]
@@ -139,11 +142,66 @@ def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(exact):
         assert np.array_equal(alone.growth[0], together.growth[lane])
 
 
-def test_flow_maps_refuse_more_elements_than_they_have_maps_for():
-    system = lanes_of([random_machine(1, 6, 5)])
+def test_flow_maps_refuse_more_elements_than_a_number_can_list():
+    system = lanes_of([random_machine(1, 2, 53)])
     plan = Plan(60, 0, 1, 1, method="flow_map")
-    with pytest.raises(ValueError, match="5 clearance elements would need maps for 32 sets"):
-        integrate(system, np.zeros((1, 12)), plan)
+    with pytest.raises(ValueError, match="take up to 52 clearance elements; this system has 53"):
+        integrate(system, np.zeros((1, 4)), plan)
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    """Lanes of machines with six elements, many with the same maps, their plan and outcome."""
+    machines = [random_machine(seed, 6, 6) for seed in range(3)]
+    system = lanes_of([machines[n % 3] for n in range(108)])
+    # Machine 2 has two lanes only, the others more than a block of them.
+    system = system.of([n for n in range(108) if n % 3 < 2 or n < 6])
+    start = 0.5 * np.random.default_rng(3).normal(size=(system.lanes, 12))
+    start[5] = np.nan
+    # So few steps are doubled, for each lane as often as it needs.
+    plan = Plan(3, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
+    return system, start, plan, integrate(system, start, plan)
+
+
+def test_lanes_of_the_crowd_cross_and_enter_different_sets(crowd):
+    _, _, _, whole = crowd
+    assert np.flatnonzero(whole.status).tolist() == [5]
+    assert np.unique(whole.crossings).size > 5 and whole.crossings.max() > 20
+    kept = on_demand._kept.places.values()
+    assert max(len(places) for places in kept) > 10 and min(len(places) for places in kept) == 1
+
+
+@pytest.mark.parametrize("map_bytes", [0, 2**27])
+def test_maps_made_on_demand_in_any_order_give_the_same_bits(crowd, monkeypatch, map_bytes):
+    system, start, plan, whole = crowd
+    for chosen in (np.arange(system.lanes)[::-1], [3, 70, 1], [4]):
+        monkeypatch.setattr(on_demand, "_kept", on_demand._Kept(0))
+        few = plan._replace(map_bytes=map_bytes)
+        some = integrate(system.of(chosen), start[chosen], few)
+        assert_same_bits(some, lanes_out_of(whole, chosen))
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="needs two threads")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_maps_made_on_demand_give_the_same_bits_on_any_threads(crowd, monkeypatch, threads):
+    system, start, plan, whole = crowd
+    monkeypatch.setattr(on_demand, "_kept", on_demand._Kept(0))
+    before = numba.get_num_threads()
+    numba.set_num_threads(threads)
+    try:
+        assert_same_bits(integrate(system, start, plan), whole)
+    finally:
+        numba.set_num_threads(before)
+
+
+def test_maps_that_no_steps_suffice_for_stop_their_lanes_only(crowd):
+    system, start, plan, whole = crowd
+    wild = system.of(np.arange(4))
+    wild.rate[1] *= 1e7
+    some = integrate(wild, start[:4], plan)
+    assert some.status.tolist() == [0, Status.TOO_FAST, 0, 0]
+    assert np.isnan(some.section[1]).all() and np.isnan(some.growth[1]).all()
+    assert np.array_equal(some.section[[0, 2, 3]], whole.section[[0, 2, 3]])
 
 
 def test_a_lane_may_lack_a_term_that_its_neighbours_have():
