@@ -126,7 +126,7 @@ def main() -> None:
     config = load_config(SWEEP, [f"sweep.count={options.lanes}"])
     system = Lanes(config).system_of(np.arange(options.lanes))
     start = system.contact_state()
-    exact = by_maps(system, start, 24, ERROR_PERIODS)
+    exact = by_maps(system, start, 36, ERROR_PERIODS)
     print(
         f"flow maps, 12 steps: error {error(by_maps(system, start, 12, ERROR_PERIODS), exact):.1e}"
     )

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.memory.rows import LANES
-from gearchaos_kernels.methods.flow_map.layout import layout_of
+from gearchaos_kernels.methods.flow_map.layout import MOST_SETS_IN_ADVANCE, layout_of
 from gearchaos_kernels.methods.flow_map.series import (
     ORDER,
     TAIL,
@@ -52,6 +52,9 @@ They are medians over scenes of two, six and ten states, with and without a tang
 
 SETS_VISITED = 4
 """Sets of branches that a motion visits, as an estimate, where maps are made on demand."""
+
+MAKING_ON_DEMAND, READING_ON_DEMAND, MOVING_ON_DEMAND = 1_500.0 * SETS_VISITED, 6.0, 1.0
+"""The same times where maps are made on demand, medians of a planetary set of 34 states."""
 
 FEWEST_RECORDED = 240
 """Fewest steps per period if recorders read every step: they interpolate by parabolas."""
@@ -94,8 +97,12 @@ def work(system: Any, plan: Plan, stable: NDArray[np.int64]) -> float:
     ``stable`` (lanes,): steps per period with which RK4 is stable.
     """
     _, first, lanes = np.unique(sharing(system), return_index=True, return_counts=True)
-    periods = plan.transient_periods + plan.recorded_periods
-    step = MAKING + periods * (READING + MOVING * lanes)
+    periods, flags = plan.transient_periods + plan.recorded_periods, system.flags()
+    making, reading, moving = MAKING, READING, MOVING
+    elements = provider_of(flags).elements(flags)
+    if system.clearance and 2**elements > MOST_SETS_IN_ADVANCE:
+        making, reading, moving = MAKING_ON_DEMAND, READING_ON_DEMAND, MOVING_ON_DEMAND
+    step = making + periods * (reading + moving * lanes)
     return float(np.sum(_steps_needed(system, plan, stable[first]) * step))
 
 
