@@ -364,8 +364,13 @@ def solve(scale, matrices, acting, terms, seen, pulled):
             for begin in range(0, seen.shape[2], width):
                 part = pulled[k, element, begin : begin + width]
                 for j in range(k + 1):
-                    for at in range(width):
-                        part[at] += stiffness[element, k - j, at] * seen[j, element, begin + at]
+                    row = seen[j, element, begin : begin + width]
+                    if width == TOGETHER:
+                        for at in range(TOGETHER):
+                            part[at] += stiffness[element, k - j, at] * row[at]
+                    else:
+                        for at in range(width):
+                            part[at] += stiffness[element, k - j, at] * row[at]
                 for at in range(width):
                     forces[element, begin + at] = engaged[element] * part[at]
         add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
@@ -402,8 +407,13 @@ def multiplied(a, b):
     for line in range(a.shape[0]):
         for source in range(b.shape[0]):
             for column in range(b.shape[1]):
-                for at in range(b.shape[2]):
-                    target[line, column, at] += a[line, source, at] * b[source, column, at]
+                if b.shape[2] == TOGETHER:
+                    # A constant length: the loop becomes one vector.
+                    for at in range(TOGETHER):
+                        target[line, column, at] += a[line, source, at] * b[source, column, at]
+                else:
+                    for at in range(b.shape[2]):
+                        target[line, column, at] += a[line, source, at] * b[source, column, at]
     return target
 
 
