@@ -118,7 +118,8 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
             # Another kind of this table has the key; in pydantic the kind precedes the key.
             tag = next(name for name in _TAGS if f"{table}.{name}" in keys)
             rule = f'has no meaning with {tag} = "{error["loc"][-2]}"'
-            remedy = f"drop it, or choose another {table}.{tag}"
+            here = ".".join(map(str, names[:-1]))
+            remedy = f"drop it, or choose another {here}.{tag}"
     elif isinstance(value, str) and kind in ("literal_error", "union_tag_invalid"):
         remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
     elif isinstance(value, str) and kind == "float_type" and NUMBER.fullmatch(value.strip()):
@@ -150,7 +151,8 @@ def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
         # pydantic adds the kind of a table that has several, and "[key]" for an invalid key.
         added = tagged or (name == "[key]" and error["type"] != "extra_forbidden")
         names += [] if added else [name]
-        key = keys.get(".".join(map(str, names)))
+        words = [one for one in names if isinstance(one, str)]
+        key = keys.get(declared_path(words, keys))
         tagged = not added and key is not None and len(key.tables) > 1
     return names
 

@@ -40,6 +40,13 @@ PHYSICAL = {
     "mesh.stiffness.cosine_N_per_um_mm": (-1.202, 0.0, -0.1339),
     "mesh.stiffness.sine_N_per_um_mm": (1.203, 0.0, -0.1335),
     "mesh.stiffness.harmonics": None,
+    **{
+        f"mesh.stiffness.{key}": None
+        for key in (
+            *("file", "phase_column", "column", "period", "unit"),
+            *("fit_error", "most_harmonics", "phase", "values"),
+        )
+    },
     "pitch_error.kind": "sine",
     "pitch_error.amplitude_um": 11.0,
     "pitch_error.mean_um": 2.0,

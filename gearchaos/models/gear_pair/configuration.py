@@ -10,6 +10,7 @@ from gearchaos.models.gear_pair.lane_rules import lane_faults
 from gearchaos.models.gear_pair.pitch_errors import with_deviation_files
 from gearchaos.models.gear_pair.rules import RULES
 from gearchaos.models.gear_pair.tables import GearPairTables
+from gearchaos.models.stiffness_table import with_stiffness_files
 
 
 class GearPairConfiguration(GearPairTables, Configuration):
@@ -27,8 +28,13 @@ class GearPairConfiguration(GearPairTables, Configuration):
     def with_files(
         cls, tables: Mapping[str, Any], folder: str | None
     ) -> tuple[Mapping[str, Any], list[Fault]]:
-        """Return tables with the pitch deviations of the files that they name, and faults."""
-        return with_deviation_files(tables, folder)
+        """Return tables with the contents of the files that they name, and faults.
+
+        These are pitch deviations and tables of the mesh stiffness.
+        """
+        tables, faults = with_stiffness_files(tables, folder)
+        tables, more = with_deviation_files(tables, folder)
+        return tables, [*faults, *more]
 
     def lane_faults(self) -> Iterator[Fault]:
         """Yield the faults of the groups of the lanes, where each table is sound."""

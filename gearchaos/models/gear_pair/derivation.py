@@ -15,6 +15,8 @@ from gearchaos.arrays import Floats
 from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness
 from gearchaos.models.gear_pair.geometry import HelicalPair, Value
+from gearchaos.models.phase_series import Series
+from gearchaos.models.stiffness_table import IN_N_PER_UM, PER_WIDTH, table_series
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3
@@ -110,7 +112,15 @@ class Quantities:
 
     @cached_property
     def mean_stiffness(self) -> Any:
-        """k_m in N/m: mean mesh stiffness per unit face width times the face width."""
+        """k_m in N/m: mean mesh stiffness per unit face width times the face width.
+
+        A table of the stiffness in units of force has its mean.
+        """
+        unit = self.physical["mesh.stiffness.unit"]
+        if unit in IN_N_PER_UM:
+            return self.table.mean * IN_N_PER_UM[unit] / _MICROMETRE
+        if unit == PER_WIDTH:
+            return self.table.mean * _N_PER_UM_MM * self.pair.face_width
         per_width = self["mesh.mean_stiffness_N_per_um_mm"] * _N_PER_UM_MM
         return per_width * self.pair.face_width
 
@@ -194,6 +204,12 @@ class Quantities:
             return self.over_length_scale("pitch_error.amplitude_um")
         return np.cos(self.pair.transverse_pressure_angle) * _MICROMETRE / self.length_scale
 
+    @property
+    def table(self) -> Series:
+        """The Fourier series of a table of the stiffness, in the unit of the table."""
+        names = ("phase", "values", "period", "fit_error", "most_harmonics")
+        return table_series(*(self.physical[f"mesh.stiffness.{name}"] for name in names))
+
     @cached_property
     def stiffness_harmonics(self) -> tuple[Any, Any]:
         """Cosine and sine harmonics of the stiffness relative to its mean (Pan 2021, eqs 15-19)."""
@@ -203,6 +219,9 @@ class Quantities:
                 raise ConfigurationError(_ONE_TABLE)
             cosine = np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean)
             return cosine, np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean)
+        if self["mesh.stiffness.shape"] == "table":
+            series = self.table
+            return np.array(series.cosine) / series.mean, np.array(series.sine) / series.mean
         ratios = common_contact_ratios(self.pair)
         if ratios is None:
             raise ConfigurationError(_ONE_TABLE)

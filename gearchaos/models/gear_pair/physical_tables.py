@@ -9,6 +9,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BeforeValidator, Field
 
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
+from gearchaos.models.stiffness_table import StiffnessTable
 
 _Teeth: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
 _NotNegative: TypeAlias = Annotated[float, Field(ge=0)]
@@ -20,7 +21,7 @@ PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], AS_LIST]
 NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], AS_LIST]
 TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], AS_LIST]
 
-_SHAPE = '"fourier" takes the coefficients, "trapezoid" the contact ratio of [pair]'
+_SHAPE = '"fourier" takes coefficients, "trapezoid" the contact ratio of [pair], "table" a table'
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
 _optional = partial(key, default=None)
 _mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
@@ -116,7 +117,10 @@ class Mesh(Table):
         "coefficient of friction between the teeth", "1", 0.06, ge=0, lt=1
     )
     stiffness: (
-        Annotated[FourierStiffness | TrapezoidStiffness, Field(discriminator="shape")] | None
+        Annotated[
+            FourierStiffness | TrapezoidStiffness | StiffnessTable, Field(discriminator="shape")
+        ]
+        | None
     ) = _optional("variation of the mesh stiffness over the mesh period")
 
 

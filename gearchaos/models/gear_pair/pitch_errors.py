@@ -1,19 +1,16 @@
 """Pitch errors tooth by tooth, measured or drawn by a grade: their files and their rules."""
 
 import csv
-import os
-import re
 from collections.abc import Iterator, Mapping
-from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.messages import NUMBER, Fault, shown
+from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.methods import DEFAULT, METHODS
+from gearchaos.configuration.named_files import CsvText, fault_of, text_beside
 from gearchaos.configuration.tables import swept_values
-from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
 from gearchaos.models.gear_pair.physical_tables import (
     GearDeviations,
@@ -54,56 +51,17 @@ def with_deviation_files(
         read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
         try:
             if not isinstance(files.get(name), str):
-                files[name] = _text_beside(folder, name)
-            table[read] = _column(files[name], table.get("column"))
+                files[name] = text_beside(folder, name, "file of pitch deviations")
+            table[read] = CsvText(files[name]).column(table.get("column"), "tooth")
             tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
         except (GearchaosError, ValueError, csv.Error) as fault:
-            rule, remedy = [*map(str, fault.args), ""][:2]
-            faults.append(Fault(f"pitch_error.{gear}.file", rule, remedy, name))
+            faults.append(fault_of(f"pitch_error.{gear}.file", fault, name))
     return tables, faults
-
-
-def _text_beside(folder: str | None, name: str) -> str:
-    """Read the text of a file in the folder of the configuration."""
-    if folder is None:
-        rule = "is not kept under [files], and other files are not read here"
-        raise ValueError(rule, "run the sweep again, or read the configuration with load_config")
-    path = os.path.join(folder, name)
-    try:
-        return text_of_file(path, "file of pitch deviations")
-    except GearchaosError as fault:
-        # The fault names the file.
-        raise ValueError(str(fault).removeprefix(f"{path}: ")) from None
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
     found = tables.get(name)
     return dict(found) if isinstance(found, Mapping) else {}
-
-
-def _column(text: str, column: object) -> list[float]:
-    """Return the numbers of a column; ValueError with rule and remedy where they are none."""
-    # Notes become empty lines, which are not rows.
-    lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
-    headline = next(filter(None, lines), "")
-    delimiter = next((mark for mark in ";\t," if mark in headline), ",")
-    reader = csv.reader(lines, delimiter=delimiter)
-    rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
-    headings = rows.pop(0)[1] if rows else []
-    if column not in headings:
-        asked = "column is missing" if column is None else f"has no column {shown(column)}"
-        # Content is never quoted: the path may lead to any file of this machine.
-        raise ValueError(asked, "name a heading of its first line")
-    place = headings.index(column)
-    cells = [(line, "".join(row[place : place + 1])) for line, row in rows]
-    # Beside a gear with more teeth a column ends in empty cells.
-    while cells and not cells[-1][1]:
-        cells.pop()
-    for line, cell in cells:
-        if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
-            rule = f"line {line}, column {column}: must be a finite number"
-            raise ValueError(rule, "give one for every tooth, decimals with a point")
-    return [float(cell) for _, cell in cells]
 
 
 def _kind(config: GearPairTables) -> str:

@@ -9,6 +9,7 @@ from gearchaos_kernels import GearPairs, Teeth
 from gearchaos.arrays import Floats
 from gearchaos.models.gear_pair.derivation import LENGTH
 from gearchaos.models.gear_pair.tables import GearPairTables
+from gearchaos.models.stiffness_table import note_of, tables_in
 
 
 def remarks(
@@ -22,6 +23,8 @@ def remarks(
     if system.repeats_after > 1:
         yield _parting_pairs(system)
         yield _printed_gaps(config)
+    for path, table in tables_in(config.mesh, "mesh"):
+        yield note_of(path, table)
     yield _negative_stiffness(system)
     yield _mistaken_units(config, system.repeats_after > 1, parameters)
 

@@ -7,6 +7,7 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.rules import Rules
 from gearchaos.models.gear_pair.derivation import BACKLASHES
 from gearchaos.models.gear_pair.tables import GearPairTables
+from gearchaos.models.stiffness_table import IN_N_PER_UM, PER_WIDTH
 
 ANGLES = {"pair.normal_pressure_angle_deg", "pair.helix_angle_deg"}
 """Paths of the angles by which a backlash is converted from one plane to another."""
@@ -57,6 +58,22 @@ def _backlash_can_be_converted(config: GearPairTables) -> Iterator[Fault]:
         if config.pair is None and (path in config.swept or config.physical()[path] is not None):
             rule = "is converted by the angles of [pair], which is missing"
             yield Fault(path, rule, f"give [pair], or {BACKLASHES[0]}", config.physical()[path])
+
+
+@RULES.reads("mesh")
+def _one_mean_stiffness(config: GearPairTables) -> Iterator[Fault]:
+    path, given = "mesh.mean_stiffness_N_per_um_mm", config.physical()
+    unit = given["mesh.stiffness.unit"]
+    if given["mesh.stiffness.shape"] != "table":
+        return
+    if unit is None:
+        rule = f"is missing, must be one of {', '.join(IN_N_PER_UM)}, {PER_WIDTH}, 1"
+        remedy = 'name it in the heading of the column, or give unit; "1" is relative to the mean'
+        yield Fault("mesh.stiffness.unit", rule, remedy)
+    elif unit != "1" and (given[path] is not None or path in config.swept):
+        rule = f"is given or swept beside a table of the stiffness in {unit}, which has its mean"
+        remedy = 'keep one of the two; with unit = "1" the table gives the shape alone'
+        yield Fault(path, rule, remedy, given[path])
 
 
 @RULES.reads("mesh", "pair")

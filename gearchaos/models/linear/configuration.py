@@ -1,7 +1,6 @@
 """The configuration of a machine that is given by its matrices."""
 
 import csv
-import os
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
@@ -15,10 +14,10 @@ from gearchaos.arrays import Floats
 from gearchaos.configuration.base import Configuration, configuration_keys
 from gearchaos.configuration.keys import key
 from gearchaos.configuration.messages import Fault, declared_path
+from gearchaos.configuration.named_files import fault_of, text_beside
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.rules import GENERIC_RULES
 from gearchaos.configuration.tables import Parameter
-from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
 from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.rules import RULES
@@ -34,6 +33,7 @@ from gearchaos.models.linear.tables import (
     wave_of,
 )
 from gearchaos.models.linear.values import numbers_in, with_numbers
+from gearchaos.models.stiffness_table import with_stiffness_files
 from gearchaos.outputs.names import rate_of
 
 
@@ -75,24 +75,24 @@ class LinearConfiguration(MachineConfiguration):
     def with_files(
         cls, tables: Mapping[str, Any], folder: str | None
     ) -> tuple[Mapping[str, Any], list[Fault]]:
-        """Return tables with the matrices of the files that they name, and the faults of these.
+        """Return tables with the contents of the files that they name, and the faults of these.
 
-        The texts of the files are kept in ``files``.
+        These are matrices and tables of stiffness. The texts of the files are kept in ``files``.
         """
+        tables, faults = with_stiffness_files(tables, folder)
         model = tables.get("model")
         model = dict(model) if isinstance(model, Mapping) else {}
         given = tables.get("files")
-        files, faults = dict(given) if isinstance(given, Mapping) else {}, []
+        files = dict(given) if isinstance(given, Mapping) else {}
         for name in MATRICES:
             file = model.get(name)
             if isinstance(file, str):
                 try:
                     if not isinstance(files.get(file), str):
-                        files[file] = _text_beside(folder, file)
+                        files[file] = text_beside(folder, file, "file with a matrix")
                     model[name] = _rows_of(files[file])
                 except (GearchaosError, ValueError, csv.Error) as fault:
-                    rule, remedy = [*map(str, fault.args), ""][:2]
-                    faults.append(Fault(f"model.{name}", rule, remedy, file))
+                    faults.append(fault_of(f"model.{name}", fault, file))
         return ({**tables, "model": model, "files": files} if files else tables), faults
 
     @property
@@ -117,8 +117,8 @@ class LinearConfiguration(MachineConfiguration):
         """Return the orders of all waves, ascending; at least the first one."""
         found = {1} | {one.order for one in self.force.values()}
         for one in self.clearance.values():
-            for waves in (one.stiffness, one.motion):
-                if isinstance(waves, Fourier):
+            for waves in (one.waves, one.motion):
+                if waves is not None:
                     found |= set(range(1, 1 + max(len(waves.cosine), len(waves.sine))))
         return tuple(sorted(found))
 
@@ -196,19 +196,6 @@ def _matrix(given: Any) -> Floats:
     """Return the matrix of a diagonal or of rows."""
     array = np.array(given, dtype=np.float64)
     return np.diag(array) if array.ndim == 1 else array
-
-
-def _text_beside(folder: str | None, name: str) -> str:
-    """Read the text of a file in the folder of the configuration."""
-    if folder is None:
-        rule = "is not kept under [files], and other files are not read here"
-        raise ValueError(rule, "run the sweep again, or read the configuration with load_config")
-    path = os.path.join(folder, name)
-    try:
-        return text_of_file(path, "file with a matrix")
-    except GearchaosError as fault:
-        # The fault names the file.
-        raise ValueError(str(fault).removeprefix(f"{path}: ")) from None
 
 
 def _rows_of(text: str) -> list[list[float]]:

@@ -1,6 +1,6 @@
 """A machine as the engine sees it: systems, parameters, loads and motions."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +13,7 @@ from gearchaos.models.linear.configuration import MachineConfiguration
 from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
 from gearchaos.models.protocol import Model, accelerations
+from gearchaos.models.stiffness_table import note_of, tables_in
 from gearchaos.outputs.scales import Quantity
 
 
@@ -45,6 +46,18 @@ class MachineModel(Model):
         """Return the names of the clearance elements."""
         del effects
         return self._kinds.elements
+
+    def remarks(
+        self,
+        config: MachineConfiguration,
+        system: LaneSystem,
+        parameters: Mapping[str, Floats],
+    ) -> Iterator[str]:
+        """Yield how well tables of stiffness are represented."""
+        del system, parameters
+        for name, _ in config:
+            for path, table in tables_in(getattr(config, name), name):
+                yield note_of(path, table)
 
     def loads(self, loads: Floats, system: LaneSystem) -> dict[str, Floats]:
         """Return forces and gaps of each element by name."""

@@ -1,11 +1,13 @@
 """The tables of a configuration that describe a machine by its matrices."""
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from gearchaos.configuration.keys import AS_LIST, Table, key
+from gearchaos.models.stiffness_table import StiffnessTable
 
 Name: TypeAlias = Annotated[str, Field(pattern="^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 Row: TypeAlias = dict[Name, float]
@@ -32,6 +34,7 @@ class Shares(Table):
 class Fourier(Table):
     """A stiffness as a sum of waves of the mesh phase."""
 
+    shape: Literal["fourier"] = key("form in which the stiffness is given", default="fourier")
     mean: float = key("mean value", ge=0)
     cosine: Annotated[tuple[float, ...], AS_LIST] = key(
         "amplitudes of the cosines of order 1, 2 and so on", default=(), max_length=200
@@ -39,6 +42,27 @@ class Fourier(Table):
     sine: Annotated[tuple[float, ...], AS_LIST] = key(
         "amplitudes of the sines of order 1, 2 and so on", default=(), max_length=200
     )
+
+
+def _form_of(given: Any) -> str:
+    """Return in which form a stiffness is given."""
+    if not isinstance(given, Mapping | Fourier | StiffnessTable):
+        return "number"
+    shape = given.get("shape", "fourier") if isinstance(given, Mapping) else given.shape
+    return shape if shape in ("fourier", "table") else ""
+
+
+Stiffness: TypeAlias = Annotated[
+    Annotated[float, Tag("number")]
+    | Annotated[Fourier, Tag("fourier")]
+    | Annotated[StiffnessTable, Tag("table")],
+    Discriminator(
+        _form_of,
+        custom_error_type="value_error",
+        custom_error_context={"error": 'shape must be "fourier" or "table"; choose one of them'},
+    ),
+]
+"""A constant, a sum of waves, or a table over the period."""
 
 
 class Clearance(Table):
@@ -52,7 +76,7 @@ class Clearance(Table):
     reaction: Row | None = key(default=None)
     """factor of the force in the equation of each coordinate; by default those of the gap, as for
     any real spring"""
-    stiffness: float | Fourier = key("stiffness", example=100.0)
+    stiffness: Stiffness = key("stiffness", example=100.0)
     damping: float = key("damping coefficient", default=0.0, ge=0)
     damping_acts: Literal["always", "in_contact"] = key(default="always")
     """whether the damper acts all the time, or only while the element is in contact"""
@@ -66,6 +90,9 @@ class Clearance(Table):
     def waves(self) -> Fourier:
         """The stiffness as a sum of waves."""
         given = self.stiffness
+        if isinstance(given, StiffnessTable):
+            series = given.series
+            return Fourier.model_construct(mean=series.mean, cosine=series.cosine, sine=series.sine)
         return given if isinstance(given, Fourier) else Fourier(mean=given)
 
 

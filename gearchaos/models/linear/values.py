@@ -4,10 +4,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gearchaos.configuration.keys import Table
+from gearchaos.models.stiffness_table import StiffnessTable
 
 
 def numbers_in(tables: Any, path: str = "") -> Iterator[tuple[str, Table, str]]:
-    """Give dotted path, table and name of every number (float) inside a table or named tables."""
+    """Give dotted path, table and name of every number (float) inside a table or named tables.
+
+    The settings of a fit are no numbers of the machine.
+    """
+    if isinstance(tables, StiffnessTable):
+        return
     if isinstance(tables, Mapping):
         for name, table in tables.items():
             yield from numbers_in(table, f"{path}.{name}".lstrip("."))

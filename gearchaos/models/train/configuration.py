@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 from gearchaos.configuration.keys import key
 from gearchaos.configuration.messages import Fault, suggestion
@@ -14,11 +15,13 @@ from gearchaos.models.linear.configuration import MachineConfiguration, paramete
 from gearchaos.models.linear.machine import Kinds, Machine, without_drift
 from gearchaos.models.linear.rules import add_rules_of_machines
 from gearchaos.models.linear.values import with_numbers
+from gearchaos.models.stiffness_table import IN_N_PER_UM, with_stiffness_files
 from gearchaos.models.train import planetary, shafts
 from gearchaos.models.train.assembly import Assembly
 from gearchaos.models.train.tables import (
     Gears,
     Meshes,
+    MeshStiffness,
     ModelTable,
     Operation,
     Planetary,
@@ -46,6 +49,22 @@ class TrainConfiguration(MachineConfiguration):
     gear: Gears = key("the gears by name", default={})
     mesh: Meshes = key("the meshes by name", default={})
     planetary: Planetary | None = key("a planetary set", default=None)
+
+    @classmethod
+    def with_files(
+        cls, tables: Mapping[str, Any], folder: str | None
+    ) -> tuple[Mapping[str, Any], list[Fault]]:
+        """Return tables with the tables of stiffness in the files that they name, and faults."""
+        return with_stiffness_files(tables, folder)
+
+    @property
+    def meshes(self) -> Iterator[tuple[str, MeshStiffness]]:
+        """The meshes by the path of their table."""
+        for name, mesh in self.mesh.items():
+            yield f"mesh.{name}", mesh
+        if self.planetary is not None:
+            yield "planetary.sun_mesh", self.planetary.sun_mesh
+            yield "planetary.ring_mesh", self.planetary.ring_mesh
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
@@ -137,7 +156,7 @@ def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
         yield Fault("mesh", rule, "add the mesh, or remove the shaft")
         return
     orders = config.orders()
-    highest = max(config.mesh[name].harmonics * order for name, order in orders.items())
+    highest = max(config.mesh[name].kept_harmonics * order for name, order in orders.items())
     if highest > MOST_ORDER:
         periods = ", ".join(f"{order} of {name}" for name, order in orders.items())
         rule = f"the meshes repeat together only after {periods} mesh periods"
@@ -145,10 +164,28 @@ def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
         yield Fault("mesh", rule, f"{remedy} the common frequency exceed {MOST_ORDER}")
 
 
+@RULES.reads("mesh", "planetary")
+def _every_mesh_has_one_stiffness(config: TrainConfiguration) -> Iterator[Fault]:
+    """A mesh has either a mean stiffness or a table, whose unit is that of a stiffness."""
+    for path, mesh in config.meshes:
+        given = mesh.stiffness_N_per_um
+        if mesh.stiffness is None and given is None:
+            remedy = "give it, or stiffness with a table"
+            yield Fault(f"{path}.stiffness_N_per_um", "is missing", remedy)
+        elif mesh.stiffness is not None and given is not None:
+            rule = "is given beside a table of the stiffness"
+            yield Fault(f"{path}.stiffness_N_per_um", rule, "keep one of the two", given)
+        elif mesh.stiffness is not None and mesh.stiffness.unit not in IN_N_PER_UM:
+            rule = f"must be one of {', '.join(IN_N_PER_UM)}"
+            remedy = "give the unit, or name it in the heading of the column"
+            yield Fault(f"{path}.stiffness.unit", rule, remedy, mesh.stiffness.unit or "missing")
+
+
 @RULES.reads("shaft", "gear", "mesh", "planetary", "scene")
 def _the_train_is_held(config: TrainConfiguration) -> Iterator[Fault]:
     """Something keeps every part of the train in place."""
-    if not config.is_complete or any(True for _ in _planets_can_be_assembled(config)):
+    faults = (_planets_can_be_assembled, _every_mesh_has_one_stiffness)
+    if not config.is_complete or any(True for check in faults for _ in check(config)):
         return
     loose = without_drift(config.machine({}), config.kinds_of_elements.coordinates)
     if loose:

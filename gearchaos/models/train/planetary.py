@@ -158,7 +158,7 @@ def _add_mesh(
     if "transmission_error" not in effects:
         error = np.zeros_like(error)
     inertia = parts.inertia_along(row)
-    damping = 2.0 * mesh.damping_ratio * math.sqrt(mesh.stiffness_N_per_um * inertia)
+    damping = 2.0 * mesh.damping_ratio * math.sqrt(mesh.mean_stiffness * inertia)
     backlash = mesh.half_backlash_um if "backlash" in effects else 0.0
     in_contact = mesh.damping_acts == "in_contact" and "backlash" in effects
     parts.element(name, row, (stiffness, error), damping, backlash, in_contact)

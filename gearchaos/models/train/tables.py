@@ -11,6 +11,7 @@ from gearchaos.configuration import run_tables
 from gearchaos.configuration.keys import AS_LIST, Table, key
 from gearchaos.configuration.run_tables import ONCE
 from gearchaos.models.linear.tables import NAMED, Name
+from gearchaos.models.stiffness_table import IN_N_PER_UM, StiffnessTable
 
 Effect: TypeAlias = Literal[
     "stiffness_variation", "backlash", "transmission_error", "translation", "bearing_clearance"
@@ -44,7 +45,11 @@ class Operation(Table):
 class MeshStiffness(Table):
     """Stiffness, damping, backlash and error of a mesh, along its line of action."""
 
-    stiffness_N_per_um: float = key("mean mesh stiffness", units="N/um", example=400.0, gt=0)
+    stiffness_N_per_um: float | None = key(
+        "mean mesh stiffness", units="N/um", example=400.0, default=None, gt=0
+    )
+    stiffness: StiffnessTable | None = key(default=None)
+    """a table of the stiffness over the mesh period, instead of its mean and the contact ratio"""
     contact_ratio: float = key("contact ratio", example=1.6, default=1.6, ge=1, le=10)
     """mean number of tooth pairs in contact; the stiffness is in proportion to their number"""
     harmonics: int = key("harmonics of the stiffness that are kept", default=5, ge=1, le=40)
@@ -57,6 +62,24 @@ class MeshStiffness(Table):
     """amplitude of the unloaded transmission error, a sine once a mesh period"""
     phase_turns: float = key("mesh phase", units="1", default=0.0)
     """share of a mesh period by which this mesh is ahead"""
+
+    @property
+    def table_factor(self) -> float:
+        """N/um per unit of the table of stiffness."""
+        unit = None if self.stiffness is None else self.stiffness.unit
+        return IN_N_PER_UM.get(unit or "", 1.0)
+
+    @property
+    def mean_stiffness(self) -> float:
+        """Mean mesh stiffness in N/um."""
+        if self.stiffness is not None:
+            return self.table_factor * self.stiffness.series.mean
+        return self.stiffness_N_per_um or 0.0
+
+    @property
+    def kept_harmonics(self) -> int:
+        """Number of harmonics of the stiffness."""
+        return self.harmonics if self.stiffness is None else self.stiffness.series.harmonics
 
 
 class Shaft(Table):

@@ -1,7 +1,7 @@
 """Waves of the excitation: stiffness and error of a mesh over a common period."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -28,7 +28,7 @@ def orders_of(meshes: Iterable[tuple[MeshStiffness, int]]) -> tuple[int, ...]:
     """Return the orders of all waves of meshes with these orders, ascending."""
     found = {1}
     for mesh, order in meshes:
-        found |= {order * number for number in range(1, mesh.harmonics + 1)}
+        found |= {order * number for number in range(1, mesh.kept_harmonics + 1)}
     return tuple(sorted(found))
 
 
@@ -41,14 +41,25 @@ def stiffness_waves(
     contact ratio. Its Fourier series is cut. ``phase``: share of a mesh period, beside its own.
     """
     waves = np.zeros(1 + 2 * len(orders))
-    waves[0] = mesh.stiffness_N_per_um
-    for number in range(1, mesh.harmonics + 1) if varies else ():
-        turns = math.pi * number * mesh.contact_ratio
-        size = 2.0 * mesh.stiffness_N_per_um * math.sin(turns) / turns
+    waves[0] = mesh.mean_stiffness
+    for number, (cosine, sine) in enumerate(_harmonics(mesh) if varies else (), 1):
         at = 1 + 2 * orders.index(order * number)
         angle = 2.0 * math.pi * number * (phase + mesh.phase_turns)
-        waves[at : at + 2] = size * math.cos(angle), -size * math.sin(angle)
+        turned, across = math.cos(angle), math.sin(angle)
+        waves[at : at + 2] = cosine * turned + sine * across, sine * turned - cosine * across
     return waves
+
+
+def _harmonics(mesh: MeshStiffness) -> Iterator[tuple[float, float]]:
+    """Yield cosine and sine part of the harmonics of the stiffness at its own phase."""
+    if mesh.stiffness is not None:
+        series, factor = mesh.stiffness.series, mesh.table_factor
+        for cosine, sine in zip(series.cosine, series.sine, strict=True):
+            yield factor * cosine, factor * sine
+        return
+    for number in range(1, mesh.harmonics + 1):
+        turns = math.pi * number * mesh.contact_ratio
+        yield 2.0 * mesh.mean_stiffness * math.sin(turns) / turns, 0.0
 
 
 def error_waves(

@@ -1,0 +1,87 @@
+"""Files that a configuration names: their text, and columns of CSV text."""
+
+import csv
+import os
+import re
+from collections.abc import Iterator
+from math import isfinite
+
+from gearchaos.configuration.messages import NUMBER, Fault, shown
+from gearchaos.configuration.toml_text import text_of_file
+from gearchaos.errors import GearchaosError
+
+
+def text_beside(folder: str | None, name: str, what: str) -> str:
+    """Read the text of a file in the folder of the configuration.
+
+    ``what``: name of the file in messages. Without a folder nothing is read: a stored
+    configuration must not open files. Raises ValueError with rule and remedy.
+    """
+    if folder is None:
+        rule = "is not kept under [files], and other files are not read here"
+        raise ValueError(rule, "run the sweep again, or read the configuration with load_config")
+    path = os.path.join(folder, name)
+    try:
+        return text_of_file(path, what)
+    except GearchaosError as fault:
+        # The fault names the file.
+        raise ValueError(str(fault).removeprefix(f"{path}: ")) from None
+
+
+def fault_of(key: str, error: Exception, name: str) -> Fault:
+    """Return the fault of a file as a fault of the key that names it."""
+    rule, remedy = [*map(str, error.args), ""][:2]
+    return Fault(key, rule, remedy, name)
+
+
+class CsvText:
+    """Columns of CSV text below a line of headings.
+
+    Columns are separated by comma, semicolon or tab. Lines that begin with ``#`` are notes.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    decimal_comma : bool
+        Whether decimals may have a comma where columns are separated by semicolons or tabs.
+
+    Attributes
+    ----------
+    headings : list of str
+        The headings.
+    """
+
+    def __init__(self, text: str, *, decimal_comma: bool = False) -> None:
+        # Notes become empty lines, of which there are no rows.
+        lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
+        headline = next(filter(None, lines), "")
+        delimiter = next((mark for mark in ";\t," if mark in headline), ",")
+        self._decimal_comma = decimal_comma and delimiter != ","
+        reader = csv.reader(lines, delimiter=delimiter)
+        self._rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
+        self.headings = self._rows.pop(0)[1] if self._rows else []
+
+    def column(self, name: object, whose: str = "") -> list[float]:
+        """Return the numbers of a column; ValueError with rule and remedy if there are none.
+
+        Empty cells at the end do not count. ``whose``: what has one number, in messages.
+        """
+        if name not in self.headings:
+            asked = "column is missing" if name is None else f"has no column {shown(name)}"
+            # Content is never quoted: the path may lead to any file of this machine.
+            raise ValueError(asked, "name a heading of its first line")
+        place = self.headings.index(name)
+        cells = [(line, "".join(row[place : place + 1])) for line, row in self._rows]
+        while cells and not cells[-1][1]:
+            cells.pop()
+        return list(self._numbers(cells, str(name), whose))
+
+    def _numbers(self, cells: list[tuple[int, str]], name: str, whose: str) -> Iterator[float]:
+        """Yield the cells of a column as numbers."""
+        for line, cell in cells:
+            text = cell.replace(",", ".") if self._decimal_comma else cell
+            if not (NUMBER.fullmatch(text) and isfinite(float(text))):
+                rule = f"line {line}, column {name}: must be a finite number"
+                raise ValueError(rule, f"give one for every {whose}, decimals with a point")
+            yield float(text)
