@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.models.gear_pair.geometry import HelicalPair
+from gearchaos.models.gear_pair.geometry import HelicalPair, angle_of_involute
 
 
 def pan_2021_pair(**changes):
@@ -84,3 +84,79 @@ def test_arrays_give_elementwise_what_their_entries_give():
     for quantity in ("overlap_contact_ratio", "equivalent_mass", "total_contact_ratio"):
         one_by_one = [getattr(pan_2021_pair(face_width=width), quantity) for width in widths]
         assert np.array_equal(getattr(together, quantity), one_by_one)
+
+
+def involute(angle):
+    return np.tan(angle) - angle
+
+
+def test_angles_are_found_by_their_involute():
+    angles = np.radians([0.5, 5.0, 14.5, 20.0, 35.0, 60.0])
+    assert angle_of_involute(involute(angles)) == pytest.approx(angles, abs=1e-12)
+
+
+# Worked examples of KHK Gear Technical Reference, tables of profile shifted spur and helical gears.
+@pytest.mark.parametrize(
+    ("catalogue", "angle_deg", "distance_mm", "tips_mm"),
+    [
+        (
+            {"teeth": (12, 24), "helix_angle": 0.0, "profile_shift": (0.6, 0.36)},
+            26.0886,
+            56.4999,
+            (44.840, 79.400),
+        ),
+        (
+            {"teeth": (12, 60), "helix_angle": np.pi / 6, "profile_shift": (0.09809, 0.0)},
+            23.1126,
+            125.000,
+            (48.153, 213.842),
+        ),
+    ],
+)
+def test_profile_shifted_pairs_of_a_textbook(catalogue, angle_deg, distance_mm, tips_mm):
+    pair = pan_2021_pair(normal_module=3e-3, **catalogue)
+    assert np.degrees(pair.working_pressure_angle) == pytest.approx(angle_deg, abs=1e-4)
+    assert 1e3 * pair.working_centre_distance == pytest.approx(distance_mm, abs=6e-4)
+    # Printed as sums of a diameter and two addenda, each with three decimals.
+    assert 2e3 * np.array(pair.tip_radii) == pytest.approx(tips_mm, abs=1.5e-3)
+
+
+def test_the_sum_of_the_shifts_follows_from_the_working_angle():
+    pair = pan_2021_pair(profile_shift=(0.4, 0.15))
+    working, alpha = pair.working_pressure_angle, pair.transverse_pressure_angle
+    total = involute(working) - involute(alpha)
+    total *= sum(pair.teeth) / (2.0 * np.tan(pair.normal_pressure_angle))
+    assert total == pytest.approx(0.55, abs=1e-12)
+    # The same pair by its centre distance and its tip circles.
+    tips = tuple(2.0 * radius for radius in pair.tip_radii)
+    same = pan_2021_pair(centre_distance=pair.working_centre_distance, tip_diameters=tips)
+    assert same.working_pressure_angle == pytest.approx(working, abs=1e-13)
+    assert same.transverse_contact_ratio == pytest.approx(pair.transverse_contact_ratio, rel=1e-12)
+
+
+def test_shifts_that_cancel_keep_the_standard_centre_distance():
+    pair, standard = pan_2021_pair(profile_shift=(0.3, -0.3)), pan_2021_pair()
+    assert pair.working_pressure_angle == pytest.approx(standard.working_pressure_angle, abs=1e-13)
+    assert pair.working_centre_distance == pytest.approx(sum(standard.reference_radii), rel=1e-13)
+    longer = np.array(pair.tip_radii) - standard.tip_radii
+    assert longer == pytest.approx([0.3 * 2.166e-3, -0.3 * 2.166e-3], rel=1e-9)
+    unshifted = pan_2021_pair(profile_shift=(0.0, 0.0))
+    assert unshifted.transverse_contact_ratio == pytest.approx(
+        standard.transverse_contact_ratio, rel=1e-12
+    )
+
+
+def test_the_path_of_contact_ends_where_the_tip_circles_cut_the_line_of_action():
+    pair = pan_2021_pair(profile_shift=(0.4, 0.15))
+    distance, working = pair.working_centre_distance, pair.working_pressure_angle
+    # Centres at 0 and `distance`; the line of action touches the base circle of the first one.
+    foot = pair.base_radii[0] * np.array([np.cos(working), np.sin(working)])
+    along = np.array([np.sin(working), -np.cos(working)])
+    ends = []
+    for centre, radius in zip((0.0, distance), pair.tip_radii, strict=True):
+        apart = foot - [centre, 0.0]
+        half = along @ apart
+        root = np.sqrt(half**2 - apart @ apart + radius**2)
+        ends.append(-half + root if centre == 0.0 else -half - root)
+    ratio = (ends[0] - ends[1]) / pair.transverse_base_pitch
+    assert pair.transverse_contact_ratio == pytest.approx(ratio, rel=1e-10)

@@ -108,6 +108,10 @@ class Quantities:
             density=self["pair.density_kg_m3"],
             given_masses=self.physical["pair.masses_kg"],
             given_inertias=self.physical["pair.inertias_kg_m2"],
+            profile_shift=self.physical["pair.profile_shift"],
+            centre_distance=_in_metres(self.physical["pair.centre_distance_mm"]),
+            tip_diameters=_in_metres(self.physical["pair.tip_diameters_mm"]),
+            contact_ratio=self.physical["pair.contact_ratio"],
         )
 
     @cached_property
@@ -176,13 +180,13 @@ class Quantities:
         return damping / (2.0 * np.sqrt(self.mean_stiffness * self.pair.equivalent_mass))
 
     def friction_lever(self) -> Any:
-        """Lever of friction over that of the mesh force, tan(alpha_t) / cos(beta_b).
+        """Lever of friction over that of the mesh force, tan(alpha_wt) / cos(beta_b).
 
         At the pitch point the contact is as far from the foot of either perpendicular on the line
-        of action as r_b tan(alpha_t). Friction is that of the normal force, whose component
+        of action as r_b tan(alpha_wt). Friction is that of the normal force, whose component
         along the line of action in the transverse plane has the factor cos(beta_b).
         """
-        tangent = np.tan(self.pair.transverse_pressure_angle)
+        tangent = np.tan(self.pair.working_pressure_angle)
         return tangent / np.cos(self.pair.base_helix_angle)
 
     def bearing_stiffness(self, direction: str, gear: int) -> Any:
@@ -230,10 +234,20 @@ class Quantities:
         return coefficients.real, -coefficients.imag
 
 
+def _in_metres(millimetres: Any) -> Any:
+    """Return a length, or a pair of lengths, in m; None if it is not known."""
+    if millimetres is None:
+        return None
+    if isinstance(millimetres, tuple | list):
+        return tuple(_MILLIMETRE * one for one in millimetres)
+    return _MILLIMETRE * millimetres
+
+
 _ONE_TABLE = (
     "the harmonics of the mesh stiffness would differ between the swept values, but all "
-    "values of a sweep share one stiffness table: give stiffness_cosine and "
-    "stiffness_sine in [groups], or sweep stiffness_variation_scale"
+    "values of a sweep share one stiffness table, which the compiled equations read at every step: "
+    "give stiffness_cosine and stiffness_sine in [groups], sweep stiffness_variation_scale, or "
+    'describe the pair by model.kind = "train", where every value has its own harmonics'
 )
 
 

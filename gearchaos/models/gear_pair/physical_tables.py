@@ -18,6 +18,7 @@ Harmonics: TypeAlias = Annotated[
     tuple[float, ...], Field(strict=False, min_length=1, max_length=1000)
 ]
 PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], AS_LIST]
+NumberPair: TypeAlias = Annotated[tuple[float, float], AS_LIST]
 NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], AS_LIST]
 TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], AS_LIST]
 
@@ -40,6 +41,20 @@ class Pair(Table):
         "helix angle on the reference circle, either hand", "degree", 20.0, default=0.0, ge=0, lt=90
     )
     face_width_mm: float = key("face width", "mm", 15.0, gt=0)
+    profile_shift: NumberPair | None = _optional(
+        "profile shift coefficients x [driving, driven]", "1", [0.3, 0.1]
+    )
+    centre_distance_mm: float | None = _optional(
+        "centre distance, by default that without backlash", "mm", 68.0, gt=0
+    )
+    tip_diameters_mm: PositivePair | None = _optional(
+        "diameters of the tip circles [driving, driven], by default for an addendum of one module",
+        "mm",
+        [52.7, 91.9],
+    )
+    contact_ratio: float | None = _optional(
+        "transverse contact ratio, instead of the one of the tip circles", "1", 1.5, gt=0, le=10
+    )
     density_kg_m3: float = key(
         "density of the gears, taken as solid discs on the reference circle",
         "kg/m^3",

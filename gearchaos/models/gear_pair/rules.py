@@ -3,14 +3,20 @@
 from collections.abc import Iterator
 from functools import partial
 
+import numpy as np
+
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.rules import Rules
-from gearchaos.models.gear_pair.derivation import BACKLASHES
+from gearchaos.models.gear_pair.derivation import BACKLASHES, Quantities
+from gearchaos.models.gear_pair.geometry_faults import geometry_faults
 from gearchaos.models.gear_pair.tables import GearPairTables
 from gearchaos.models.stiffness_table import IN_N_PER_UM, PER_WIDTH
 
 ANGLES = {"pair.normal_pressure_angle_deg", "pair.helix_angle_deg"}
 """Paths of the angles by which a backlash is converted from one plane to another."""
+
+GEOMETRY = ("profile_shift", "centre_distance_mm", "tip_diameters_mm", "contact_ratio")
+"""Keys of [pair] that describe gears other than standard ones."""
 
 RULES = Rules()
 
@@ -81,6 +87,23 @@ def _contact_ratio_is_known(config: GearPairTables) -> Iterator[Fault]:
     if config.pair is None and config.physical()["mesh.stiffness.shape"] == "trapezoid":
         rule = "a trapezoid takes its shape from the contact ratio of [pair]"
         yield Fault("mesh.stiffness", rule, 'give [pair], or shape = "fourier"')
+
+
+@RULES.reads("pair")
+def _geometry_is_possible(config: GearPairTables) -> Iterator[Fault]:
+    pair = config.pair
+    if pair is None or all(getattr(pair, name) is None for name in GEOMETRY):
+        return
+    if "pair.centre_distance_mm" in config.swept and pair.profile_shift is not None:
+        rule = "is given, and the centre distance that belongs to it is swept"
+        remedy = "leave it out, and give tip_diameters_mm or contact_ratio"
+        yield Fault("pair.profile_shift", rule, remedy, pair.profile_shift)
+        return
+    names = ("centre_distance", "contact_ratio", "tip_diameters")
+    paths = {name: next(p for p in GEOMETRY if p.startswith(name)) for name in names}
+    paths = {name: f"pair.{path}" for name, path in paths.items()}
+    with np.errstate(all="ignore"):
+        yield from geometry_faults(Quantities(config.physical()).pair, paths)
 
 
 def _states_exist(table: str, key: str, config: GearPairTables) -> Iterator[Fault]:

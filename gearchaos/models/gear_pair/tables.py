@@ -92,10 +92,13 @@ PHYSICAL_KEYS = {
 SMOOTHING = "pitch_error.smoothing"
 """A single number that all lanes share, with the weights with which pairs of teeth carry."""
 
+CONTACT_RATIO = "pair.contact_ratio"
+"""A single number that all lanes share, with the harmonics of the mesh stiffness."""
+
 SWEEPABLE_KEYS = {
     path: key
     for path, key in PHYSICAL_KEYS.items()
-    if key.is_number and path.count(".") == 1 and path != SMOOTHING
+    if key.is_number and path.count(".") == 1 and path not in (SMOOTHING, CONTACT_RATIO)
 }
 """Physical keys that a sweep may vary, by path: the single numbers of the physical tables."""
 

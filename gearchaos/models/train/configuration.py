@@ -16,7 +16,7 @@ from gearchaos.models.linear.machine import Kinds, Machine, without_drift
 from gearchaos.models.linear.rules import add_rules_of_machines
 from gearchaos.models.linear.values import with_numbers
 from gearchaos.models.stiffness_table import IN_N_PER_UM, with_stiffness_files
-from gearchaos.models.train import planetary, shafts
+from gearchaos.models.train import geometry, planetary, shafts
 from gearchaos.models.train.assembly import Assembly
 from gearchaos.models.train.tables import (
     Gears,
@@ -105,9 +105,8 @@ class TrainConfiguration(MachineConfiguration):
         effects = self.scene.effects
         if self.planetary is not None:
             return planetary.assembled(tables["planetary"], effects)
-        return shafts.assembled(
-            tables["shaft"], tables["gear"], tables["mesh"], self.orders(), effects
-        )
+        gears = geometry.completed(tables["gear"], tables["mesh"])
+        return shafts.assembled(tables["shaft"], gears, tables["mesh"], self.orders(), effects)
 
     def speeds(self) -> dict[str, Fraction]:
         """Return the speed of each shaft relative to the driven one."""
@@ -164,6 +163,27 @@ def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
         yield Fault("mesh", rule, f"{remedy} the common frequency exceed {MOST_ORDER}")
 
 
+@RULES.reads("gear", "mesh")
+def _gears_fit_each_other(config: TrainConfiguration) -> Iterator[Fault]:
+    """Every gear has one size, and gears in mesh have the same base pitch."""
+    gears = geometry.completed(config.gear, config.mesh)
+    faults = [
+        fault
+        for name, gear in gears.items()
+        for fault in geometry.faults_of_gear(f"gear.{name}", gear)
+    ]
+    yield from faults
+    if faults or any(True for _ in _names_exist(config)):
+        return
+    for name, mesh in config.mesh.items():
+        yield from geometry.faults_of_mesh(f"mesh.{name}", mesh, gears)
+    for path, table in config.swept.items():
+        if mate := geometry.fault_of_sweep(path, config.gear, config.mesh):
+            rule = f"would change one gear of a mesh, and gear.{mate} has its own tooth data"
+            remedy = f"leave out normal_module_mm of gear.{mate}, which then has those of its mate"
+            yield Fault(table, rule, remedy, path)
+
+
 @RULES.reads("mesh", "planetary")
 def _every_mesh_has_one_stiffness(config: TrainConfiguration) -> Iterator[Fault]:
     """A mesh has either a mean stiffness or a table, whose unit is that of a stiffness."""
@@ -184,7 +204,7 @@ def _every_mesh_has_one_stiffness(config: TrainConfiguration) -> Iterator[Fault]
 @RULES.reads("shaft", "gear", "mesh", "planetary", "scene")
 def _the_train_is_held(config: TrainConfiguration) -> Iterator[Fault]:
     """Something keeps every part of the train in place."""
-    faults = (_planets_can_be_assembled, _every_mesh_has_one_stiffness)
+    faults = (_planets_can_be_assembled, _every_mesh_has_one_stiffness, _gears_fit_each_other)
     if not config.is_complete or any(True for check in faults for _ in check(config)):
         return
     loose = without_drift(config.machine({}), config.kinds_of_elements.coordinates)

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from gearchaos.models.train.assembly import Assembly
+from gearchaos.models.train.geometry import given_ratios
 from gearchaos.models.train.tables import MEMBERS, MeshStiffness, Planetary
 from gearchaos.models.train.waves import error_waves, orders_of, stiffness_waves
 
@@ -152,8 +153,8 @@ def _add_mesh(
 ) -> None:
     """Add a mesh as a clearance element."""
     orders = parts.orders
-    varies = "stiffness_variation" in effects
-    stiffness = stiffness_waves(mesh, 1, orders, varies=varies, phase=phase)
+    ratios = given_ratios(mesh) if "stiffness_variation" in effects else None
+    stiffness = stiffness_waves(mesh, 1, orders, ratios, phase)
     error = error_waves(mesh, 1, orders, phase)
     if "transmission_error" not in effects:
         error = np.zeros_like(error)

@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from gearchaos.models.train.assembly import Assembly
+from gearchaos.models.train.geometry import base_radius_mm, contact_ratios
 from gearchaos.models.train.tables import Gear, Mesh, Shaft
 from gearchaos.models.train.waves import (
     common_orders,
@@ -95,8 +96,9 @@ def _add_mesh(
 ) -> None:
     """Add a mesh as a clearance element."""
     row = _row_of(mesh, gears)
-    orders, varies = parts.orders, "stiffness_variation" in effects
-    stiffness = stiffness_waves(mesh, order, orders, varies=varies)
+    orders = parts.orders
+    ratios = contact_ratios(mesh, gears) if "stiffness_variation" in effects else None
+    stiffness = stiffness_waves(mesh, order, orders, ratios)
     error = error_waves(mesh, order, orders)
     if "transmission_error" not in effects:
         error = np.zeros_like(error)
@@ -112,7 +114,7 @@ def _row_of(mesh: Mesh, gears: Mapping[str, Gear]) -> dict[str, float]:
     row: dict[str, float] = {}
     for name, side in zip(mesh.gears, (1.0, -1.0), strict=True):
         gear = gears[name]
-        row[f"{gear.shaft}_angle"] = side * gear.base_radius_mm
+        row[f"{gear.shaft}_angle"] = side * base_radius_mm(gear)
         row[f"{gear.shaft}_x"] = side * math.cos(angle)
         row[f"{gear.shaft}_y"] = side * math.sin(angle)
     return row

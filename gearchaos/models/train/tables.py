@@ -50,8 +50,9 @@ class MeshStiffness(Table):
     )
     stiffness: StiffnessTable | None = key(default=None)
     """a table of the stiffness over the mesh period, instead of its mean and the contact ratio"""
-    contact_ratio: float = key("contact ratio", example=1.6, default=1.6, ge=1, le=10)
-    """mean number of tooth pairs in contact; the stiffness is in proportion to their number"""
+    contact_ratio: float | None = key("contact ratio", example=1.6, default=None, ge=1, le=10)
+    """mean number of tooth pairs in contact, to which the stiffness is in proportion; by default
+    that of the gears if their modules are known, otherwise 1.6"""
     harmonics: int = key("harmonics of the stiffness that are kept", default=5, ge=1, le=40)
     damping_ratio: float = key("damping ratio of the mesh", default=0.05, ge=0, lt=1)
     damping_acts: Literal["always", "in_contact"] = key(default="always")
@@ -98,11 +99,29 @@ class Shaft(Table):
 
 
 class Gear(Table):
-    """A gear of a shaft."""
+    """A gear of a shaft, by its base radius or by its normal module."""
 
     shaft: Name = key("name of the shaft", example="input")
     teeth: int = key("number of teeth", example=25, ge=4, le=10_000)
-    base_radius_mm: float = key("base radius", units="mm", example=35.2, gt=0)
+    base_radius_mm: float | None = key("base radius", units="mm", example=35.2, default=None, gt=0)
+    normal_module_mm: float | None = key(
+        "normal module instead of the base radius", units="mm", default=None, gt=0
+    )
+    normal_pressure_angle_deg: float = key(
+        "normal pressure angle", units="deg", default=20.0, gt=0, lt=60
+    )
+    helix_angle_deg: float = key(
+        "helix angle on the reference circle", units="deg", default=0.0, ge=0, lt=60
+    )
+    face_width_mm: float | None = key("face width", units="mm", default=None, gt=0)
+    """face width, from which the overlap of helical gears follows; without it they have none"""
+    profile_shift: float = key("profile shift coefficient", units="1", default=0.0)
+    tip_diameter_mm: float | None = key(
+        "diameter of the tip circle, by default for an addendum of one module",
+        units="mm",
+        default=None,
+        gt=0,
+    )
 
 
 class Mesh(MeshStiffness):
@@ -113,6 +132,12 @@ class Mesh(MeshStiffness):
     )
     line_angle_deg: float = key("direction of the line of action", units="deg", default=90.0)
     """direction in which the driving tooth pushes, from the x axis"""
+    centre_distance_mm: float | None = key(
+        "centre distance of gears with a module, by default that without backlash",
+        units="mm",
+        default=None,
+        gt=0,
+    )
 
 
 class MemberTable(Table):

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from gearchaos.arrays import Floats
+from gearchaos.models.train.geometry import ContactRatios
 from gearchaos.models.train.tables import MeshStiffness
 
 MOST_ORDER = 400
@@ -33,16 +34,20 @@ def orders_of(meshes: Iterable[tuple[MeshStiffness, int]]) -> tuple[int, ...]:
 
 
 def stiffness_waves(
-    mesh: MeshStiffness, order: int, orders: Sequence[int], *, varies: bool, phase: float = 0.0
+    mesh: MeshStiffness,
+    order: int,
+    orders: Sequence[int],
+    ratios: ContactRatios | None,
+    phase: float = 0.0,
 ) -> Floats:
     """Return the stiffness of a mesh as parts of the waves, in N/um.
 
-    The number of tooth pairs in contact is a sum of rectangles, one for each pair, as long as the
-    contact ratio. Its Fourier series is cut. ``phase``: share of a mesh period, beside its own.
+    ``ratios``: its contact ratios, None if the stiffness does not vary; ``phase``: share of a mesh
+    period, beside its own.
     """
     waves = np.zeros(1 + 2 * len(orders))
     waves[0] = mesh.mean_stiffness
-    for number, (cosine, sine) in enumerate(_harmonics(mesh) if varies else (), 1):
+    for number, (cosine, sine) in enumerate(_harmonics(mesh, ratios) if ratios else (), 1):
         at = 1 + 2 * orders.index(order * number)
         angle = 2.0 * math.pi * number * (phase + mesh.phase_turns)
         turned, across = math.cos(angle), math.sin(angle)
@@ -50,16 +55,24 @@ def stiffness_waves(
     return waves
 
 
-def _harmonics(mesh: MeshStiffness) -> Iterator[tuple[float, float]]:
-    """Yield cosine and sine part of the harmonics of the stiffness at its own phase."""
+def _harmonics(mesh: MeshStiffness, ratios: ContactRatios) -> Iterator[tuple[float, float]]:
+    """Yield cosine and sine part of the harmonics of the stiffness at its own phase.
+
+    The contact line of a tooth pair is a rectangle as long as the transverse contact ratio, and of
+    helical gears its convolution with one as long as the overlap ratio. The stiffness is in
+    proportion to the sum over all pairs, whose Fourier series is cut.
+    """
     if mesh.stiffness is not None:
         series, factor = mesh.stiffness.series, mesh.table_factor
         for cosine, sine in zip(series.cosine, series.sine, strict=True):
             yield factor * cosine, factor * sine
         return
     for number in range(1, mesh.harmonics + 1):
-        turns = math.pi * number * mesh.contact_ratio
-        yield 2.0 * mesh.mean_stiffness * math.sin(turns) / turns, 0.0
+        turns = math.pi * number * ratios.transverse
+        size = 2.0 * mesh.mean_stiffness * math.sin(turns) / turns
+        if ratios.overlap > 0.0:
+            size *= float(np.sinc(number * ratios.overlap))
+        yield size, 0.0
 
 
 def error_waves(
