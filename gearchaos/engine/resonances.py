@@ -15,7 +15,7 @@ ORDERS = (1, 2, 3)
 EXAMINED_LANES = 256
 """Largest number of lanes that are examined, spread evenly over the sweep."""
 
-UNIT, MESH_FREQUENCY = "per unit of tau", "(mesh frequency)"
+UNIT = "per unit of tau"
 
 
 class Resonances(NamedTuple):
@@ -31,8 +31,8 @@ class Resonances(NamedTuple):
         Static deflection in units of b'; NaN where the model has none.
     micrometres : array, shape (2,), or None
         The same in micrometres.
-    contact_words, deflection_words : str
-        Descriptions of contact and deflection, see `Model`.
+    contact_words, deflection_words, exciter : str
+        Descriptions of contact, of the deflection and of what excites, see `Model`.
     """
 
     frequencies: Floats
@@ -42,6 +42,7 @@ class Resonances(NamedTuple):
     micrometres: Floats | None
     contact_words: str
     deflection_words: str
+    exciter: str
 
     @property
     def texts(self) -> dict[str, str]:
@@ -49,14 +50,15 @@ class Resonances(NamedTuple):
         where = f"({self.contact_words})"
         texts = {"modes": f"none that oscillates {where}"}
         if len(self.frequencies):
-            values, unit, met, speed = self.frequencies, UNIT, self.frequencies, MESH_FREQUENCY
+            values, unit, met = self.frequencies, UNIT, self.frequencies
+            speed = f"({self.exciter} frequency)"
             if self.hertz is not None:
                 values, unit = self.hertz, "Hz"
             if self.rpm is not None:
                 met, speed = self.rpm, "rpm"
             texts["modes"] = f"eigenfrequencies {_listed(values)} {unit} {where}"
             orders = (f"order {order} at {_listed(met / order)} {speed}" for order in ORDERS)
-            texts["orders"] = f"the mesh meets them with {'; '.join(orders)}"
+            texts["orders"] = f"the {self.exciter} meets them with {'; '.join(orders)}"
         bent, unit = self.deflection, "b'"
         if self.micrometres is not None:
             bent, unit = self.micrometres, "um"
@@ -73,7 +75,9 @@ class Resonances(NamedTuple):
             facts["eigenfrequencies_Hz"] = self.hertz.tolist()
         if self.rpm is not None:
             facts["resonant_speeds_rpm"] = _by_order(self.rpm)
-        facts["static_deflection"] = self.deflection.tolist()
+        # JSON has no NaN.
+        if np.isfinite(self.deflection).all():
+            facts["static_deflection"] = self.deflection.tolist()
         if self.micrometres is not None:
             facts["static_deflection_um"] = self.micrometres.tolist()
         return facts
@@ -96,6 +100,7 @@ def resonances(lanes: Lanes) -> Resonances:
         None if scales.length is None else _ends(bent * scales.length),
         lanes.model.contact_words,
         lanes.model.deflection_words,
+        lanes.model.exciter,
     )
 
 

@@ -71,6 +71,8 @@ class Model(ABC):
         Names of the signals that the compiled formulas observe.
     contact_words, deflection_words : str
         What the eigenfrequencies and the static deflection are those of, in a sentence.
+    exciter : str
+        What excites once a period, such as the mesh.
     excitation_words, shorter_excitation : str
         What repeats after several mesh periods, with its verb, and how it repeats earlier.
     shared_inputs : str
@@ -82,6 +84,7 @@ class Model(ABC):
     signals: tuple[str, ...] = ()
     contact_words: str = "mean stiffness, all elements in contact"
     deflection_words: str = "under the static load"
+    exciter: str = "excitation"
     excitation_words: str = "excitation repeats"
     shorter_excitation: str = "choose an excitation that repeats earlier"
     shared_inputs: str = "excitation and clearance"

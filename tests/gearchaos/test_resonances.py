@@ -188,3 +188,12 @@ def test_groups_beyond_all_measure_have_no_eigenfrequencies_and_no_traceback(nam
     found = known(PAN2021, f"groups.{name}=1e300")
     assert np.isfinite(found.frequencies).all()
     assert found.texts
+
+
+def test_a_machine_without_gears_has_an_excitation_and_no_mesh():
+    found = known(PAN2021.with_name("two_masses.toml"))
+    assert found.texts["orders"].startswith("the excitation meets them with order 1 at 1.41, ")
+    assert "(excitation frequency)" in found.texts["orders"]
+    # JSON has no NaN; a machine has no static deflection of its own.
+    assert "static_deflection" not in found.facts
+    assert "NaN" not in json.dumps(found.facts)

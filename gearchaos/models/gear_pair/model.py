@@ -41,6 +41,7 @@ class GearPairModel(Model):
     catalogue = CATALOGUE
     load_parts = (FORCES_PART, LOADS_PART)
     signals = (TRANSMISSION_ERROR,)
+    exciter = "mesh"
     contact_words = "mean mesh stiffness, teeth in contact"
     deflection_words = "of the mesh under the static load, along the transverse line of action"
 

@@ -28,6 +28,7 @@ class TrainModel(MachineModel):
         }
     )
     angle = "_angle"
+    exciter = "mesh"
     contact_words = "mean mesh stiffness, all teeth in contact"
 
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:
