@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.run_plan import plan_run
 
 from .commands import run_module
 
@@ -27,6 +28,16 @@ def read(text, folder=None):
         ("stiffness = 100.0\n", "", "clearance.stop.stiffness: is missing"),
         ("stiffness = 100.0", "stiffness = 0.0", "must be greater than 0, otherwise"),
         ("gap = { x1", "gap = { x3", "names x3, which is none of model.coordinates"),
+        ("gap = { x1 = 1.0 }", "gap = {}", "clearance.stop.gap = {}: needs at least 1 value(s)"),
+        (
+            "gap = { x1 = 1.0 }",
+            "gap = { x1 = 0.0 }",
+            "has no coordinate with a factor other than 0",
+        ),
+        ("stiffness = 100.0", "stiffness = { mean = -1.0 }", "must be at least 0"),
+        ("stiffness = 100.0", "stiffness = { mean = 1.0, sin = [1.0] }", "did you mean `sine`?"),
+        ("stiffness = 100.0", "stiffness = true", "clearance.stop.stiffness = true: must be a num"),
+        ("stiffness = 100.0", 'stiffness = { shape = "tabel" }', 'must be "fourier" or "table"'),
         ("on = { x2", "on = { y2", "force.drive.on"),
         ("half_clearance = 1.0", "half_clearance = -1.0", "must be at least 0"),
         ('parameter = "frequency"', 'parameter = "frequenzy"', "did you mean `frequency`?"),
@@ -50,6 +61,17 @@ def test_a_machine_that_cannot_be_is_refused_in_a_sentence(tmp_path, old, new, m
         read(TEXT.replace(old, new, 1), str(tmp_path))
     assert message in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_machine_that_is_unstable_is_computed_with_a_remark():
+    # A force that follows the motion makes one of the two modes grow.
+    text = TEXT.replace("[[1.0, -1.0], [-1.0, 2.0]]", "[[1.0, -1.0], [1.0, 2.0]]")
+    text = text.replace("stiffness = 100.0", "stiffness = 0.01")
+    config = read(text.replace("{ stiffness = 0.03 }", "[0.0, 0.0]"))
+    notes = plan_run(config.replace("sweep.count", 2)).notes
+    assert sum("the machine is unstable in 100% of the lanes" in note for note in notes) == 1
+    notes = plan_run(read(TEXT).replace("sweep.count", 2)).notes
+    assert not any("unstable" in note for note in notes)
 
 
 def test_a_machine_that_nothing_holds_is_refused():

@@ -124,6 +124,9 @@ def test_a_train_at_rest_carries_its_load():
     [
         ("planetary", "planetary.planets", 4, "choose 2, 3, 6, 7, 9 planets, or other teeth"),
         ("planetary", "planetary.fixed", "sun", "three different members"),
+        ("planetary", "planetary.planet_teeth", 30, r"no common axis of sun and ring.* = 36"),
+        ("planetary", "planetary.planets", 7, "equally spaced planets overlap"),
+        ("planetary", "planetary.sun_mesh.half_backlash_um", -1.0, "must be at least 0"),
         ("two_stage", "gear.wheel_2.shaft", "outptu", "did you mean `output`"),
         ("two_stage", "mesh.second", None, "no mesh connects output with the other shafts"),
         ("two_stage", "mesh.first.gears", ["pinion_1", "wheel"], "names wheel, which is no gear"),

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, evaluate
+from gearchaos_kernels import LaneSystem, evaluate, jacobian
 from gearchaos_kernels.models.linear.system import LinearSystems
 
 from gearchaos.arrays import Array, Floats
@@ -53,11 +53,12 @@ class MachineModel(Model):
         system: LaneSystem,
         parameters: Mapping[str, Floats],
     ) -> Iterator[str]:
-        """Yield how well tables of stiffness are represented."""
-        del system, parameters
+        """Yield how well tables of stiffness are represented, and whether motions grow."""
+        del parameters
         for name, _ in config:
             for path, table in tables_in(getattr(config, name), name):
                 yield note_of(path, table)
+        yield _growing(system)
 
     def loads(self, loads: Floats, system: LaneSystem) -> dict[str, Floats]:
         """Return forces and gaps of each element by name."""
@@ -83,6 +84,22 @@ class MachineModel(Model):
             motion[f"{FORCE}{name}"] = found.forces[:, :, number].copy()
             motion[f"contact_{name}"] = found.contact[:, :, number].copy()
         return motion
+
+
+def _growing(system: LaneSystem) -> str:
+    """Return whether the machine in contact is unstable, an empty text if it is not."""
+    held = jacobian(system, np.ones((system.lanes, system.elements)))
+    values = np.linalg.eigvals(held)
+    largest = values.real.max(axis=1)
+    # Eigenvalues of undamped machines are imaginary but for rounding.
+    growing = largest > 1e-9 * np.abs(values).max(axis=1)
+    if not growing.any():
+        return ""
+    return (
+        f"with all elements in contact the machine is unstable in {growing.mean():.0%} of the "
+        f"lanes that were examined: an eigenvalue has the real part {largest.max():.3g}, so that "
+        "motions may grow until they diverge; check the signs of the stiffness and damping matrices"
+    )
 
 
 def systems_of(machines: Sequence[Machine], kinds: Kinds) -> LinearSystems:

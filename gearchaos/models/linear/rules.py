@@ -44,6 +44,9 @@ def _rows_name_coordinates(config: "LinearConfiguration") -> Iterator[Fault]:
             rule = "is none of model.coordinates"
             remedy = suggestion(unknown, names) or f"there are {', '.join(names)}"
             yield Fault(path, f"names {unknown}, which {rule}", remedy, row)
+        if row is not None and not any(row.values()):
+            remedy = f"give a factor to one of {', '.join(names)}"
+            yield Fault(path, "has no coordinate with a factor other than 0", remedy, row)
 
 
 @RULES.reads("model", "clearance", "force")

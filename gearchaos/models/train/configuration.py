@@ -32,6 +32,9 @@ from gearchaos.models.train.waves import MOST_ORDER
 
 RULES = Rules()
 
+MOST_SHIFTED_TEETH = 2
+"""Teeth of a planet more or fewer than fit, for which profile shift can make up."""
+
 PARTS = ("operation", "shaft", "gear", "mesh", "planetary")
 """Tables that describe the train."""
 
@@ -227,10 +230,26 @@ def _planets_can_be_assembled(config: TrainConfiguration) -> Iterator[Fault]:
         fitting = [n for n in range(2, 13) if both % n == 0]
         remedy = f"choose {', '.join(map(str, fitting)) or 'other'} planets, or other teeth"
         yield Fault("planetary.planets", rule + "a multiple of their number", remedy, given.planets)
+    yield from _planets_fit(given)
     tasks = (given.driven, given.fixed, given.loaded)
     if len(set(tasks)) < len(tasks):
         rule = "driven, fixed and loaded must be three different members"
         yield Fault("planetary", rule, "give each of sun, ring and carrier one of them", tasks)
+
+
+def _planets_fit(given: Planetary) -> Iterator[Fault]:
+    """A planet fills the space between sun and ring, and has room beside its neighbours."""
+    wanted = (given.ring_teeth - given.sun_teeth) / 2.0
+    if abs(given.planet_teeth - wanted) > MOST_SHIFTED_TEETH:
+        rule = f"leaves no common axis of sun and ring: (ring_teeth - sun_teeth) / 2 = {wanted:g}"
+        remedy = f"choose about {wanted:g}; profile shift makes up for {MOST_SHIFTED_TEETH} teeth"
+        yield Fault("planetary.planet_teeth", rule, remedy, given.planet_teeth)
+    elif given.planets > 1:
+        apart = (given.sun_teeth + wanted) * math.sin(math.pi / given.planets)
+        if apart < wanted:
+            rule = "equally spaced planets overlap: their pitch circles cut each other"
+            remedy = "choose fewer planets, or a larger sun"
+            yield Fault("planetary.planets", rule, remedy, given.planets)
 
 
 @RULES.reads("shaft")
