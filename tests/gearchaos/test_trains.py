@@ -83,6 +83,85 @@ def test_flow_maps_of_a_planetary_set_agree_with_fine_steps():
         assert found == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
 
 
+def relabelled(names, planets):
+    """Return the map of coordinates onto those of a set whose planets are numbered on by one.
+
+    Planet 1 of the new set is planet 2 of the old one, so that its axes are turned by one planet.
+    """
+    turn = 2.0 * np.pi / planets
+    matrix = np.zeros((len(names), len(names)))
+    for row, name in enumerate(names):
+        kind, _, rest = name.partition("_")
+        if kind == "planet":
+            old, _, what = rest.partition("_")
+            matrix[row, names.index(f"planet_{int(old) % planets + 1}_{what}")] = 1.0
+        elif rest in ("x", "y"):
+            along, across = names.index(f"{kind}_x"), names.index(f"{kind}_y")
+            sine = np.sin(turn) if rest == "x" else -np.sin(turn)
+            matrix[row, along if rest == "x" else across] = np.cos(turn)
+            matrix[row, across if rest == "x" else along] = sine
+        else:
+            matrix[row, row] = 1.0
+    return matrix
+
+
+@pytest.mark.parametrize("teeth", [(27, 99), (28, 98)])
+def test_numbering_the_planets_from_another_one_changes_their_names_only(teeth):
+    # With 28 and 98 teeth the planets mesh one third of a period after each other.
+    sun, ring = teeth
+    changes = {"sun_teeth": sun, "ring_teeth": ring, "planet_teeth": (ring - sun) // 2}
+    config = configured("planetary", {})
+    table = config.planetary.model_copy(update=changes)
+    machine = planetary.assembled(table, config.scene.effects).machine(1.0)
+    kinds = planetary.assembled(table, config.scene.effects).kinds()
+    matrix = relabelled(list(kinds.coordinates), table.planets)
+    assert matrix @ matrix.T == pytest.approx(np.eye(len(matrix)), abs=1e-15)
+    for name in ("mass", "damping", "stiffness"):
+        given = getattr(machine, name)
+        assert matrix @ given @ matrix.T == pytest.approx(given, abs=1e-11 * np.abs(given).max())
+    names = list(kinds.elements)
+    order = [
+        names.index(f"{one.split('_')[0]}_planet_{int(one[-1]) % table.planets + 1}")
+        for one in names
+    ]
+    # A gap in the new numbers is the gap of the next planet in the old ones.
+    assert machine.gap @ matrix == pytest.approx(machine.gap[order], abs=1e-14)
+    # The next planet meshes later by the same share of a period, which is a shift of the time.
+    shift = 2.0 * np.pi * (sun % table.planets) / table.planets
+    turned = np.exp(1j * shift * np.array(kinds.orders))
+    for name in ("contact_stiffness", "motion"):
+        waves = getattr(machine, name)
+        complex_waves = waves[:, 1::2] - 1j * waves[:, 2::2]
+        assert waves[order, 0] == pytest.approx(waves[:, 0])
+        assert complex_waves[order] == pytest.approx(complex_waves * turned, abs=1e-10)
+
+
+def test_the_motion_of_a_set_that_is_numbered_on_is_the_same_motion():
+    config = configured("planetary", {**SHORT, "integration.transient_periods": 0})
+    config = config.replace(
+        "sweep", {"parameter": "operation.speed_rpm", "values": [1400.0, 2500.0, 3500.0]}
+    )
+    names = list(config.kinds_of_elements.coordinates)
+    matrix = relabelled(names, 3)
+    # One planet is pushed out of its place, so that the motion begins without symmetry.
+    displaced = np.zeros(len(names))
+    displaced[[names.index("planet_1_u"), names.index("sun_x")]] = 4.0, 2.0
+    results = [
+        gearchaos.run(config.replace("start", {"kind": "given", "state": state}))
+        for state in (
+            {name: float(one) for name, one in zip(names, start, strict=True) if one}
+            for start in (displaced, matrix @ displaced)
+        )
+    ]
+    first, second = (results[0][f"force_rms_sun_planet_{number}"] for number in (1, 2))
+    assert np.abs(first / second - 1.0).min() > 1e-4
+    for gear in ("sun", "ring"):
+        for number in (1, 2, 3):
+            before = results[0][f"force_rms_{gear}_planet_{number % 3 + 1}"]
+            after = results[1][f"force_rms_{gear}_planet_{number}"]
+            assert after == pytest.approx(before, rel=1e-8)
+
+
 def test_a_planetary_set_can_be_purely_torsional():
     effects = ["stiffness_variation", "backlash", "transmission_error"]
     config = configured("planetary", {"scene.effects": effects, **SHORT})

@@ -144,8 +144,11 @@ class Piecewise:
         return np.concatenate([z[: 2 * n], z[2 * n :] + moved])
 
 
-def random_machine(seed: int, coordinates: int, elements: int) -> Piecewise:
-    """Return a random system that separates; its elements differ in kind, all entries are there."""
+def random_machine(seed: int, coordinates: int, elements: int, held: float = 1.0) -> Piecewise:
+    """Return a random system that separates; its elements differ in kind, all entries are there.
+
+    ``held``: factor of its springs; if it is not positive, nothing but the elements holds it.
+    """
     draw = np.random.default_rng(seed)
     rows = draw.normal(size=(elements, coordinates))
     half = draw.normal(size=(coordinates, coordinates))
@@ -157,7 +160,7 @@ def random_machine(seed: int, coordinates: int, elements: int) -> Piecewise:
         frequency=draw.uniform(0.6, 1.5),
         mass=np.diag(draw.uniform(0.5, 2.0, coordinates)) + 0.05,
         rate=0.05 * springs + 0.05 * np.eye(coordinates),
-        position=springs,
+        position=held * springs,
         reaction=rows.T.copy(),
         gap=rows,
         force=draw.normal(size=(coordinates, 3)),

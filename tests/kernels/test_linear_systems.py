@@ -9,6 +9,8 @@ import pytest
 from gearchaos_kernels import Plan, Status, integrate, jacobian
 from gearchaos_kernels.methods.flow_map import on_demand
 from gearchaos_kernels.models.linear.system import LinearSystems
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from .oscillator import Oscillators
 from .piecewise import alternating, lanes_of, random_machine
@@ -125,6 +127,31 @@ def test_the_state_in_contact_is_at_rest():
     for machine, state in zip(still, lanes_of(still).contact_state(), strict=True):
         z = np.concatenate([state[::2], state[1::2]])
         assert machine.change(0.0, z, [1, 1]) == pytest.approx(0.0, abs=1e-12)
+
+
+@settings(max_examples=6)
+@given(
+    size=st.sampled_from([one[:2] for one in SIZES_OF_MAPS]),
+    seed=st.integers(100, 10_000),
+    # Not 0: the compiled loops leave out what is zero in all lanes.
+    held=st.sampled_from([1.0, 0.01, -0.05]),
+    step=st.sampled_from([24, 60]),
+)
+def test_flow_maps_are_exact_for_random_systems_with_and_without_springs_to_the_ground(
+    size, seed, held, step
+):
+    machine, count = random_machine(seed, *size, held), size[0]
+    start = np.random.default_rng(seed).normal(size=2 * count) * 0.5
+    tangent = np.full(2 * count, 1.0 / np.sqrt(2 * count))
+    exact, crossed = machine.periods(np.concatenate([start, tangent]), 2)
+    plan = Plan(step, 0, 2, 2, tangent=True, contact=True, method="flow_map")
+    found = integrate(lanes_of([machine]), alternating(start, count)[np.newaxis], plan)
+    assert found.crossings[0] == crossed
+    section = alternating(exact[:, : 2 * count], count)
+    scale = max(1.0, np.abs(section).max())
+    assert found.section[0] == pytest.approx(section, abs=1e-10 * scale)
+    lengths = np.log(np.linalg.norm(exact[:, 2 * count :], axis=1))
+    assert found.growth[0] == pytest.approx(np.diff(lengths, prepend=0.0), abs=1e-10)
 
 
 @pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)
