@@ -520,13 +520,13 @@ class System:
             shares = contact_shares(outcome, plan)
         return float(sum_of_exponents(self._record, shares)[0])
 
-    def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
+    def spectrum(self, state: str | None = None, periods: int = 64) -> SpectralLines:
         """Return the amplitude spectrum of a state after the configured transient.
 
         Parameters
         ----------
-        state : str
-            Name of the state.
+        state : str, optional
+            Name of the state, by default the first one, ``"delta_5"`` of a gear pair.
         periods : int
             Length of the record in mesh periods; the spacing of lines is one mesh frequency divided
             by it.
@@ -547,6 +547,7 @@ class System:
         >>> lines.order[1]
         np.float64(0.0625)
         """
+        state = self.states[0] if state is None else state
         one_of("state", state, self.states)
         motion = self.integrate(periods, transient=self.config.integration.transient_periods)
         values = motion.states[:-1, self.states.index(state)]

@@ -20,8 +20,7 @@ from gearchaos.records.period import motion_period
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result, section_variables
 
-COORDINATE = "delta_5"  # Default coordinate: the torsion.
-
+COORDINATE = "delta_5"  # Coordinate of a gear pair that is drawn by default: the torsion.
 HIGHEST_ORDER = 8.0  # Default limit of a spectrum, as a multiple of the mesh frequency.
 DECADES = 5  # Decades of a spectrum, down from that of its highest line.
 CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # No contact, driving flanks, back flanks.
@@ -38,7 +37,7 @@ def time_history(
     axes: Axes,
     result: Result,
     lane: int,
-    variable: str = COORDINATE,
+    variable: str | None = None,
     *,
     between: Between = (None, None),
 ) -> Line2D:
@@ -52,8 +51,9 @@ def time_history(
         A response.
     lane : int
         Number of the lane, from 0, in the flattened axes of the result.
-    variable : str
-        A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``.
+    variable : str, optional
+        A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``; by
+        default the first coordinate, ``"delta_5"`` of a gear pair.
     between : (float or None, float or None)
         First and last mesh period to show; None is the end of the record.
 
@@ -73,6 +73,7 @@ def time_history(
     >>> result = gearchaos.open_result("response.h5")
     >>> line = figures.time_history(axes, result, lane=0, variable="delta_5")
     """
+    variable = variable or first_coordinate(result)
     values = motion_over_time(result, lane, variable)
     time = result[TIME]
     low = time[0] if between[0] is None else between[0]
@@ -122,7 +123,7 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
 
 
 def phase_portrait(
-    axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE
+    axes: Axes, result: Result, lane: int, coordinate: str | None = None
 ) -> tuple[Line2D, Line2D]:
     """Draw velocity against displacement, with a point at the beginning of each mesh period.
 
@@ -130,8 +131,8 @@ def phase_portrait(
     ----------
     axes, result, lane
         As for `time_history`.
-    coordinate : str
-        Such as ``"delta_5"``.
+    coordinate : str, optional
+        Such as ``"delta_5"``; by default the first one.
 
     Returns
     -------
@@ -149,6 +150,7 @@ def phase_portrait(
     >>> axes = Figure().subplots()
     >>> curve, points = figures.phase_portrait(axes, gearchaos.open_result("response.h5"), lane=0)
     """
+    coordinate = coordinate or first_coordinate(result)
     plane = coordinate, f"{coordinate}_rate"
     displacement, velocity = (motion_over_time(result, lane, name) for name in plane)
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
@@ -159,7 +161,9 @@ def phase_portrait(
     return curve, points
 
 
-def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE) -> Line2D:
+def poincare_section(
+    axes: Axes, result: Result, lane: int, coordinate: str | None = None
+) -> Line2D:
     """Draw the states at the beginning of all recorded mesh periods.
 
     Parameters
@@ -187,6 +191,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     >>> axes = Figure().subplots()
     >>> points = figures.poincare_section(axes, gearchaos.open_result("response.h5"), lane=0)
     """
+    coordinate = coordinate or first_coordinate(result)
     plane = coordinate, f"{coordinate}_rate"
     curve = np.array([motion_over_time(result, lane, name) for name in plane])
     section = np.array([result.lanes(f"section_{name}")[lane] for name in plane])
@@ -219,7 +224,7 @@ def amplitude_spectrum(
     axes, result, lane
         As for `time_history`.
     variable : str, optional
-        A variable over time, by default ``"delta_5_acceleration"``.
+        A variable over time, by default the acceleration of the first coordinate.
     highest : float
         Highest multiple of the mesh frequency to show.
 
@@ -244,7 +249,7 @@ def amplitude_spectrum(
     >>> axes = Figure().subplots()
     >>> lines = figures.amplitude_spectrum(axes, gearchaos.open_result("response.h5"), lane=0)
     """
-    variable = variable or acceleration_of(COORDINATE)
+    variable = variable or acceleration_of(first_coordinate(result))
     order, amplitude, window = _spectrum(result, lane, variable)
     shown = order <= highest
     order, amplitude = order[shown], amplitude[shown]
@@ -305,6 +310,11 @@ def coordinates_of(result: Result) -> tuple[str, ...]:
     """Return the coordinates of a response that have accelerations, in the order of the file."""
     names = response_variables_of(result)
     return tuple(name for name in names if acceleration_of(name) in names)
+
+
+def first_coordinate(result: Result) -> str:
+    """Return the coordinate that is drawn by default: the first one, the torsion of a gear pair."""
+    return next(iter(coordinates_of(result)), COORDINATE)
 
 
 def element_of(result: Result, variable: str) -> str:

@@ -84,7 +84,7 @@ def response_page(
     >>> len(page.axes)
     4
     """
-    first = next(iter(response.coordinates_of(result)), response.COORDINATE)
+    first = response.first_coordinate(result)
     motion = _motion(result, lane, first if coordinate is None else coordinate)
     layout, heights = _layout(motion, width_mm >= SIDE_BY_SIDE_MM)
     with page(width_mm, height_mm or sum(heights)) as figure:

@@ -1,11 +1,14 @@
 """Machines from their matrices: what a file may say, and the message for what it may not."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import gearchaos
+from gearchaos import figures
 from gearchaos.engine.run_plan import plan_run
 
 from .commands import run_module
@@ -92,13 +95,20 @@ def test_a_matrix_may_be_a_file_and_an_element_an_entry_of_a_list(tmp_path):
     assert read(config.text).model == given.model
 
 
-def test_a_result_names_coordinates_and_elements(tmp_path):
-    (tmp_path / "machine.toml").write_text(TEXT)
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """The folder of a short sweep of the machine, up and down."""
+    folder = tmp_path_factory.mktemp("machine")
+    (folder / "machine.toml").write_text(TEXT)
     short = [f"--set={path}={value}" for path, value in SHORT.items()]
     options = ["--set=sweep.count=3", "--set=outputs.loads=true", "--quiet", *short]
-    ended = run_module("gearchaos.sweep", "machine.toml", *options, cwd=tmp_path)
+    ended = run_module("gearchaos.sweep", "machine.toml", *options, cwd=folder)
     assert ended.code == 0, ended.err
-    result = gearchaos.open_result(tmp_path / "machine.h5")
+    return folder
+
+
+def test_a_result_names_coordinates_and_elements(swept):
+    result = gearchaos.open_result(swept / "machine.h5")
     assert result.axes == ("frequency", "direction")
     wanted = {"section_x1", "section_x2", "force_largest_stop", "gap_mean_stop"}
     assert wanted | {"contact_state_stop"} <= {*result}
@@ -110,13 +120,52 @@ def test_a_result_names_coordinates_and_elements(tmp_path):
         "--periods=8",
         "-o",
         "r.h5",
-        cwd=tmp_path,
+        cwd=swept,
     )
     assert ended.code == 0, ended.err
-    motion = gearchaos.open_result(tmp_path / "r.h5")
+    motion = gearchaos.open_result(swept / "r.h5")
     assert {"x1", "x1_rate", "x1_acceleration", "force_stop", "contact_stop"} <= {*motion}
-    ended = run_module("gearchaos.plot", "r.h5", "-o", "r.png", cwd=tmp_path)
+    ended = run_module("gearchaos.plot", "r.h5", "-o", "r.png", cwd=swept)
     assert ended.code == 0, ended.err
+    # What is drawn by default is the first coordinate.
+    axes = Figure().add_subplot()
+    for draw in (figures.time_history, figures.phase_portrait, figures.amplitude_spectrum):
+        draw(axes, motion, 0)
+        assert r"x_{\mathrm{1}}" in axes.get_ylabel()
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["stages", "machine.h5"], "stages over frequency"),
+        (["info", "machine.h5", "--verify"], "force_largest_stop (frequency, direction) float64"),
+        (["plot", "machine.h5", "--variable=force_largest_stop", "-o", "f.png"], "f.png"),
+        (["plot", "machine.h5", "--stages", "--at=direction=upwards", "-o", "t.png"], "t.png"),
+        (["export", "machine.h5", "machine.csv"], "machine.csv"),
+        (["sweep", "machine.toml", "--set=sweep.count=3", "--dry-run"], "the excitation meets"),
+    ],
+    ids=lambda one: " ".join(one) if isinstance(one, list) else "",
+)
+def test_commands_know_a_machine(swept, command, said):
+    ended = run_module(f"gearchaos.{command[0]}", *command[1:], cwd=swept)
+    assert ended.code == 0, ended.err
+    assert said in ended.out + ended.err
+    assert "mesh frequency" not in ended.out + ended.err
+
+
+def test_a_dry_run_of_a_machine_is_json(swept):
+    asked = ["machine.toml", "--set=sweep.count=3", "--dry-run", "--json"]
+    ended = run_module("gearchaos.sweep", *asked, cwd=swept)
+    assert "NaN" not in ended.out
+    assert json.loads(ended.out)["eigenfrequencies"][0][0] == pytest.approx(1.41, abs=0.01)
+
+
+def test_the_spectrum_of_a_machine_is_that_of_its_first_coordinate():
+    config = read(TEXT).replace("start", {"kind": "rest"})
+    system = gearchaos.System(config.replace("integration.steps_per_period", 200), frequency=0.7)
+    lines = system.spectrum(periods=8)
+    assert lines.order[np.argmax(lines.amplitude)] == 1.0
+    assert np.array_equal(lines.amplitude, system.spectrum("x1", periods=8).amplitude)
 
 
 def test_any_number_of_a_machine_can_be_swept():
