@@ -23,7 +23,8 @@ class Share(NamedTuple):
         Numbers of the lanes, block after block.
     blocks : array of int, shape (blocks, 4 or more)
         For each block: the place of its first lane in ``order``, its number of lanes, its steps per
-        mesh period, and the place where its maps begin in ``maps``. Then what `StepInputs.sets` holds.
+        mesh period, and the place where its maps begin in ``maps``. Then what `StepInputs.sets`
+        holds.
     maps : array, shape (numbers,)
         What the method has prepared for these lanes; empty if nothing.
     steps : array of int, shape (lanes,)
