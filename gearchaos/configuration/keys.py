@@ -18,6 +18,7 @@ class Table(BaseModel):
     """One table of the file: no conversions, no unknown keys, finite numbers only, immutable."""
 
     model_config = ConfigDict(
+        defer_build=True,
         strict=True,
         extra="forbid",
         frozen=True,
