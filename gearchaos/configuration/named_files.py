@@ -53,7 +53,7 @@ class CsvText:
     """
 
     def __init__(self, text: str, *, decimal_comma: bool = False) -> None:
-        # Notes become empty lines, of which there are no rows.
+        # Notes become empty lines, and empty lines are no rows.
         lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
         headline = next(filter(None, lines), "")
         delimiter = next((mark for mark in ";\t," if mark in headline), ",")

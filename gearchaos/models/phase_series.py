@@ -8,13 +8,13 @@ import numpy as np
 from gearchaos.arrays import Floats
 
 _SAME = 1e-6
-"""Phases or values, relative, that are equal but for the digits of the file."""
+"""Phases or values, relative, that are equal up to the digits of the file."""
 
 _LONGEST_STEP = 1.0 / 12.0
 """Longest step between phases, in mesh periods."""
 
 _EVEN_SHARE, _EVEN, _GAP = 0.75, 0.05, 1.5
-"""A table is even if so many of its steps differ from the median by less than this share of it.
+"""A table is even if this share of its steps differs from the median by less than 5 % of it.
 In an even table a step that is longer than 1.5 medians is a gap."""
 
 
@@ -114,7 +114,7 @@ def series_of(
 
     Each point counts as the part of the mesh period that is next to it. ``phase``: in mesh periods;
     ``error``: largest root mean square of the deviation, over the mean; ``most``: largest number of
-    harmonics. Raises ValueError with rule and remedy if the table is not sound, or if so many
+    harmonics. Raises ValueError with rule and remedy if the table is not sound, or if ``most``
     harmonics do not fit it.
     """
     places, points = checked(np.array(phase), np.array(values))

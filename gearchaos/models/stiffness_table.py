@@ -30,7 +30,7 @@ _DEGREES = re.compile(r"deg|°", re.IGNORECASE)
 
 
 class StiffnessTable(Table):
-    """A stiffness by a table over the mesh period, of which a Fourier series is made."""
+    """A stiffness by a table over the mesh period, which becomes a Fourier series."""
 
     shape: Literal["table"] = key("form in which the stiffness is given", example="table")
     file: str | None = key(
@@ -57,7 +57,7 @@ class StiffnessTable(Table):
 
     @model_validator(mode="after")
     def _is_sound(self) -> Self:
-        """Refuse tables of which no series follows."""
+        """Refuse tables that no series fits."""
         if self.phase is None or self.values is None:
             raise ValueError("has no table; give file, or the lists phase and values")
         try:

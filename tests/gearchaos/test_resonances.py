@@ -43,7 +43,8 @@ def natural_hertz(pair, transverse, axial, per_width) -> np.ndarray:
     m_p, m_g, i_p, i_g = pair["inertias"]
     squares = np.linalg.eigvals(stiffness / np.array([m_p, m_g, i_p, i_g, m_p, m_g])[:, None])
     # The gears turn freely together.
-    return np.sort(np.sqrt(np.sort(squares.real)[1:])) / (2.0 * np.pi)
+    # Rounding may leave a zero below 0.
+    return np.sort(np.sqrt(np.maximum(np.sort(squares.real)[1:], 0.0))) / (2.0 * np.pi)
 
 
 def test_a_pair_with_rigid_bearings_has_one_frequency_in_closed_form():

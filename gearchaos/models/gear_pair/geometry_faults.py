@@ -1,4 +1,4 @@
-"""What cannot be of the geometry of a gear pair: contradictory or impossible data."""
+"""Faults of the geometry of a gear pair: contradictory or impossible data."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos.configuration.messages import Fault
 
 _SAME = 0.005
-"""Centre distances, over the normal module, that are equal but for the digits of a drawing."""
+"""Centre distances, over the normal module, that are equal up to the digits of a drawing."""
 
 
 def geometry_faults(pair: Any, paths: dict[str, str]) -> Iterator[Fault]:

@@ -91,7 +91,7 @@ def _growing(system: LaneSystem) -> str:
     held = jacobian(system, np.ones((system.lanes, system.elements)))
     values = np.linalg.eigvals(held)
     largest = values.real.max(axis=1)
-    # Eigenvalues of undamped machines are imaginary but for rounding.
+    # Eigenvalues of undamped machines are imaginary up to rounding.
     growing = largest > 1e-9 * np.abs(values).max(axis=1)
     if not growing.any():
         return ""

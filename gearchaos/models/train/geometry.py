@@ -12,7 +12,7 @@ from gearchaos.models.gear_pair.geometry_faults import geometry_faults
 from gearchaos.models.train.tables import Gear, Mesh, MeshStiffness
 
 DEFAULT_RATIO = 1.6
-"""Contact ratio of a mesh of which nothing else is known."""
+"""Contact ratio of a mesh without other data."""
 
 SAME_PITCH = 0.01
 """Largest relative difference of the base pitches of two gears in mesh."""
@@ -29,7 +29,7 @@ class ContactRatios(NamedTuple):
 
 
 def completed(gears: Mapping[str, Gear], meshes: Mapping[str, Mesh]) -> dict[str, Gear]:
-    """Return gears of which those without a size have module, angles and width of their mates."""
+    """Return gears; those without a size take module, angles and width of their mates."""
     found = dict(gears)
     for _ in gears:
         for mesh in meshes.values():

@@ -37,7 +37,7 @@ _ENGAGED = (0,)
 """The set of branches on which all elements are engaged: the first one that has maps."""
 
 _DIVERGES = -1
-"""Stands for the place of maps whose series do not converge."""
+"""Place of maps whose series do not converge."""
 
 Places = dict[int, int]
 """Where the maps of each set of branches begin, or `_DIVERGES`."""

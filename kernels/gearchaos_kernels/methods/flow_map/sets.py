@@ -12,7 +12,7 @@ from gearchaos_kernels.memory.rows import STRIDE
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows
 
 KNOWN = -1
-"""Stands for no set that a lane lacks."""
+"""Number in place of a set if a lane lacks none."""
 
 
 @scalar
