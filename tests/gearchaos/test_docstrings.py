@@ -54,9 +54,9 @@ def public() -> Iterator[tuple[str, Any]]:
     """Yield every public function, class and method with its dotted name."""
     homes = {
         "gearchaos": [getattr(gearchaos, name) for name in gearchaos.__all__],
-        "iso1328": vars(iso1328).values(),
-        "figures": vars(figures).values(),
-        "gearchaos_kernels": vars(gearchaos_kernels).values(),
+        "iso1328": [*vars(iso1328).values()],
+        "figures": [*vars(figures).values()],
+        "gearchaos_kernels": [*vars(gearchaos_kernels).values()],
         "reading": READING,
     }
     for home, members in homes.items():
@@ -69,7 +69,7 @@ def public() -> Iterator[tuple[str, Any]]:
                 yield f"{home}.{one.__name__}", one
             # Models define the methods of lane systems; only their base class is public.
             if inspect.isclass(one) and own.startswith("gearchaos."):
-                for name, method in vars(one).items():
+                for name, method in [*vars(one).items()]:
                     function = getattr(method, "__func__", method)
                     # model_post_init is a method of pydantic.
                     own_name = not name.startswith("_") and name != "model_post_init"

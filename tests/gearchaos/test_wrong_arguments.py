@@ -80,7 +80,7 @@ def test_states_that_are_none(wrong, system):
     refused(system.orbit, 1, wrong)
 
 
-@pytest.mark.parametrize("wrong", ["x", 3, None, "delta_3"])
+@pytest.mark.parametrize("wrong", ["x", 3, [], "delta_3"])
 def test_a_name_that_is_none_is_refused_before_anything_is_integrated(wrong, system, monkeypatch):
     monkeypatch.setattr(type(system), "integrate", None)
     refused(system.spectrum, wrong)

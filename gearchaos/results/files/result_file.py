@@ -206,8 +206,9 @@ def create_all(
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
-    chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
-    how = {**_PACKED, "chunks": chunks, "fillvalue": variable.fill_value, "track_order": True}
+    how = {"fillvalue": variable.fill_value, "track_order": True}
+    if 0 not in shape:  # HDF5 has no empty chunks.
+        how |= {**_PACKED, "chunks": _chunks(shape, np.dtype(variable.dtype).itemsize)}
     dataset = file.create_dataset(variable.name, shape, variable.dtype, variable.values, **how)
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
