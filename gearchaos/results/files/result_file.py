@@ -206,7 +206,7 @@ def create_all(
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
-    how = {"fillvalue": variable.fill_value, "track_order": True}
+    how: dict[str, Any] = {"fillvalue": variable.fill_value, "track_order": True}
     if 0 not in shape:  # HDF5 has no empty chunks.
         how |= {**_PACKED, "chunks": _chunks(shape, np.dtype(variable.dtype).itemsize)}
     dataset = file.create_dataset(variable.name, shape, variable.dtype, variable.values, **how)
