@@ -22,6 +22,7 @@ from gearchaos.arguments import (
 )
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
+from gearchaos.dynamics.arclength import along_the_way
 from gearchaos.dynamics.branches import trace
 from gearchaos.dynamics.embedded import CLOSE_RETURN_RECORD, embedded_orbits
 from gearchaos.dynamics.exponents import (
@@ -412,7 +413,7 @@ class System:
         point = checked_state("orbit.point", orbit.point, self.states)
         curve = over.curve(self._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
         guess = np.append(point[0] / curve.scale, share)
-        start = curve.corrected(guess, np.append(np.zeros(guess.size - 1), 1.0))
+        start = curve.corrected(guess, along_the_way(guess.size - 1))
         if start is None:
             raise ConfigurationError(
                 f"{self.config.source}: the orbit is none of this system; find it with "

@@ -276,7 +276,7 @@ def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width:
     width : float
         Largest difference in share between both sides of the end.
     """
-    here = curve.corrected(np.append(point / curve.scale, share), _along_the_way(point.size))
+    here = curve.corrected(np.append(point / curve.scale, share), along_the_way(point.size))
     step = FIRST_STEP
     for _ in range(MOST_CURVE_STEPS if here is not None else 0):
         assert here is not None
@@ -299,7 +299,7 @@ def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width:
     return End(here, None)
 
 
-def _along_the_way(states: int) -> Floats:
+def along_the_way(states: int) -> Floats:
     """Return the unit vector (states + 1,) in which only the parameter changes."""
     return np.append(np.zeros(states), 1.0)
 
@@ -309,7 +309,7 @@ def _at_share(curve: Curve, one: CurvePoint, other: CurvePoint, share: float) ->
     part = (share - one.share) / (other.share - one.share)
     guess = one.place + part * (other.place - one.place)
     guess[-1] = share
-    return curve.corrected(guess, _along_the_way(guess.size - 1))
+    return curve.corrected(guess, along_the_way(guess.size - 1))
 
 
 def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> End:

@@ -25,6 +25,7 @@ from gearchaos.dynamics.arclength import (
     STRAIGHT,
     Curve,
     CurvePoint,
+    along_the_way,
 )
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -157,7 +158,7 @@ class TracedBranch(NamedTuple):
             if tolerance < distance <= NEIGHBOURING:
                 # Between two of its points, the branch is not straight.
                 guess[-1] = share
-                found = self.curve.corrected(guess, _along_the_way(guess.size - 1))
+                found = self.curve.corrected(guess, along_the_way(guess.size - 1))
                 if found is not None:
                     distance = _distance(scaled, found.place)
                 elif distance <= UNDECIDED:
@@ -170,11 +171,6 @@ class TracedBranch(NamedTuple):
 def _distance(section: Floats, place: Floats) -> float:
     """Return the distance of a place (states + 1,) from the nearest point of a scaled section."""
     return float(np.min(np.max(np.abs(section - place[:-1]), axis=1)))
-
-
-def _along_the_way(states: int) -> Floats:
-    """Return the unit vector (states + 1,) in which only the parameter changes."""
-    return np.append(np.zeros(states), 1.0)
 
 
 def trace(curve: Curve, start: CurvePoint, one_way: bool = False) -> TracedBranch:
@@ -293,7 +289,7 @@ def _next(
     reach = (edge - here.share) / here.tangent[-1] if here.tangent[-1] else np.inf
     guess = here.place + min(max(reach, 0.0), step) * here.tangent
     guess[-1] = edge
-    trial = curve.corrected(guess, _along_the_way(guess.size - 1))
+    trial = curve.corrected(guess, along_the_way(guess.size - 1))
     if trial is None or np.linalg.norm(trial.place - here.place) > 2.0 * step:
         return None, True
     # The tangent of a point at the edge has the direction of the parameter.

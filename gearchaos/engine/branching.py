@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Floats
-from gearchaos.dynamics.arclength import Curve, CurvePoint
+from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branches import TracedBranch, doubled_start, trace
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.provenance import provenance
@@ -180,7 +180,7 @@ class _Search:
             motion = waiting.popleft()
             curve = self.over.curve(self.run.plan, motion.period, self._scale)
             guess = np.append(motion.section[-1] / curve.scale, motion.share)
-            start = curve.corrected(guess, np.append(np.zeros(guess.size - 1), 1.0))
+            start = curve.corrected(guess, along_the_way(guess.size - 1))
             if start is None or self._known(_motion_at(curve, start), SAME):
                 continue
             self._add(trace(curve, start), waiting)
