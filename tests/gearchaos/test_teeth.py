@@ -10,7 +10,7 @@ from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.recomputing import computable
 from gearchaos.models import Configuration
-from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness, contact_shares
+from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness, line_shares
 from gearchaos.models.registry import system_of
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
@@ -181,7 +181,7 @@ def test_the_printed_form_says_what_it_makes_of_errors_of_teeth():
 def test_a_pair_that_comes_into_mesh_with_the_period_does_so_but_for_rounding(turned):
     for ratio in (1.3, 1.5, 1.7):
         stiffness = TrapezoidalStiffness.from_contact_ratios(ratio, 0.0).coefficients(1)[0]
-        _, _, entry = contact_shares(ratio, 0.0, 0.1, complex(stiffness * np.exp(1j * turned)))
+        _, _, entry = line_shares(ratio, 0.0, 0.1, complex(stiffness * np.exp(1j * turned)))
         assert entry < 1e-9
 
 

@@ -103,7 +103,7 @@ class TrapezoidalStiffness:
         return found
 
 
-def contact_shares(
+def line_shares(
     transverse: float, overlap: float, smoothing: float, fundamental: complex = 0.0
 ) -> tuple[Floats, int, float]:
     """Return the share of a tooth pair in the mesh force while it is in mesh.

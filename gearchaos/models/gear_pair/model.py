@@ -9,7 +9,7 @@ from gearchaos_kernels import Effects, GearPairs, Groups, LaneSystem, Teeth, mes
 from gearchaos.arrays import Array, Floats
 from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.configuration import GearPairConfiguration
-from gearchaos.models.gear_pair.contact_lines import contact_shares
+from gearchaos.models.gear_pair.contact_lines import line_shares
 from gearchaos.models.gear_pair.derivation import (
     FREQUENCY,
     LENGTH,
@@ -170,5 +170,5 @@ def _teeth(
             f"{config.source}: the contact ratio of [pair] would differ between the swept values, "
             "but all of them share one table of contact lines; sweep another parameter"
         )
-    shares = contact_shares(*ratios, error.smoothing, fundamental)
+    shares = line_shares(*ratios, error.smoothing, fundamental)
     return Teeth(*tooth_deviations(error, config.pair, values), *shares)
