@@ -19,6 +19,9 @@ from gearchaos.progress import say
 
 PACKAGES = ("panel", "holoviews", "datashader")
 
+PATIENCE = 1800
+"""Seconds for which the server keeps a page that a browser has begun to load."""
+
 
 class ExploreOptions(NamedTuple):
     """Options of ``gearchaos explore``."""
@@ -65,6 +68,9 @@ def _explore(options: ExploreOptions) -> None:
         websocket_origin=origins(port),
         title=f"gearchaos: {options.result}",
         warm=True,
+        # On a busy machine, a browser may take minutes between its first request and the next.
+        unused_session_lifetime_milliseconds=1000 * PATIENCE,
+        session_token_expiration=PATIENCE,
     )
     protect(application(server), port)
     server.start()

@@ -377,7 +377,7 @@ def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
 
 def answer_to(address: str, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
     """Return code, headers and text of an answer, as a program gets it that is no browser."""
-    asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=60)
+    asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=HANGS)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     asked.request("GET", f"/{path}", headers=named)
     answer = asked.getresponse()
