@@ -230,8 +230,10 @@ def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
     np.testing.assert_allclose(drawn["frame"][2:], np.subtract(drawn["seen"][2:], (left, low)))
     assert drawn["shape"] == drawn["size"]
     # What is sent is a picture, four bytes a pixel, however many points there are.
-    pixels = np.prod(drawn["shape"])
-    assert 4 * pixels < sum(sizes) < 4 * pixels + 100_000
+    # On a busy machine the zoom may arrive in several steps, with a picture for each.
+    pictures, rest = divmod(sum(sizes), 4 * int(np.prod(drawn["shape"])))
+    assert 1 <= pictures <= 5
+    assert rest < 100_000
     result = gearchaos.open_result(path).sel(direction="upwards")
     y = result["section_delta_5"]
     x = np.repeat(result["pitch_error"], y.shape[1]).reshape(y.shape)
