@@ -42,6 +42,8 @@ class Scene:
         Whether the equations of a lane switch at known moments of the mesh period.
     jumps : True or None
         Whether the force of some element jumps where a contact begins or ends.
+    control : Feedback or None
+        The controller, see `control`.
     """
 
     model: Any
@@ -53,11 +55,12 @@ class Scene:
     before: Any
     switches: Any = None
     jumps: Any = None
+    control: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""
         recorders = type(self.recorders)()
-        return replace(self, tangent=None, before=None, recorders=recorders)
+        return replace(self, tangent=None, before=None, recorders=recorders, control=None)
 
 
 class SceneType(types.Opaque):  # type: ignore[misc]
