@@ -55,7 +55,8 @@ def scene_of(system: LaneSystem, plan: Plan, control: Control | None = None) -> 
         before=flag(resolved or any(one.reads_before for one in wanted)),
         switches=flag(switches),
         jumps=flag(resolved and any(kind.damped_in_contact for kind in model.kinds_of(flags))),
-        control=control.flags() if control else None,
+        control=flag(control),
+        feedback=control.flags() if control else None,
     )
 
 

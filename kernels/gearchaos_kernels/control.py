@@ -240,7 +240,7 @@ def prepare(memory, slot, points, scale, scene):
     """Begin the estimate at the first point of the orbit, and the delay at the first state."""
     first = control_rows(scene).kept
     for state in range(scale.shape[0]):
-        if scene.control.estimated is not None:
+        if scene.feedback.estimated is not None:
             memory[(first + state) * STRIDE + slot] = points[0, state]
             memory[(control_rows(scene).kept_varied + state) * STRIDE + slot] = 0.0
         for earlier in range(control_rows(scene).delay):
@@ -258,7 +258,7 @@ def measure(memory, slot, index, phase, control, scale, scene):
     tangent = rows(scene).tangent
     states = scale.shape[0]
     for state in range(states):
-        if scene.control.estimated is None:
+        if scene.feedback.estimated is None:
             value = state_at(memory, slot, state, scale)
             noise = control.noise[index, state]
             if noise > 0.0:
@@ -272,7 +272,7 @@ def measure(memory, slot, index, phase, control, scale, scene):
             memory[(known + state) * STRIDE + slot] = memory[(kept + state) * STRIDE + slot]
             varied = memory[(kept_varied + state) * STRIDE + slot]
             memory[(known_varied + state) * STRIDE + slot] = varied
-    if scene.control.estimated is not None:
+    if scene.feedback.estimated is not None:
         place = nearest_point(memory, slot, phase, control, index, scale, scene)
         signals = control.measured.shape[0]
         for signal in range(signals):
@@ -352,7 +352,7 @@ def predict(memory, slot, index, nearest, effort, varied, control, scale, scene)
             memory[(at.kept + row) * STRIDE + slot] = memory[source * STRIDE + slot]
             source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
             memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
-    if scene.control.estimated is not None:
+    if scene.feedback.estimated is not None:
         following = (nearest + 1) % control.points.shape[1]
         for row in range(states):
             value = control.points[index, following, row]

@@ -134,7 +134,7 @@ class ControlRows(NamedTuple):
 
 def control_rows_of(scene: Scene) -> ControlRows:
     """Return the rows that a controller uses in a block."""
-    first, states, kept = rows_of(scene).control, scene.control.states, scene.control.kept
+    first, states, kept = rows_of(scene).control, scene.feedback.states, scene.feedback.kept
     known = first + 1
     last = known + 2 * states
     return ControlRows(
@@ -144,7 +144,7 @@ def control_rows_of(scene: Scene) -> ControlRows:
         kept=last,
         kept_varied=last + kept,
         end=last + 2 * kept,
-        delay=scene.control.delay,
+        delay=scene.feedback.delay,
     )
 
 
@@ -152,7 +152,7 @@ def _control_size(scene: Scene) -> int:
     """Return the number of rows that a controller uses in a block."""
     if scene.control is None:
         return 0
-    size: int = 1 + 2 * scene.control.states + 2 * scene.control.kept
+    size: int = 1 + 2 * scene.feedback.states + 2 * scene.feedback.kept
     return size
 
 
