@@ -17,9 +17,9 @@ class ControlledMotion(NamedTuple):
     inputs : array, shape (starts, mesh periods)
         What the controller adds to the load, dimensionless, in every mesh period.
     distance : array, shape (starts, mesh periods)
-        Distance from the target orbit in the scales of its states.
+        Largest deviation of a state from the target orbit, as a share of its largest state.
     within : float
-        Largest distance of a motion that counts as captured.
+        Largest distance of a motion that counts as captured, in the same measure.
     """
 
     section: Floats

@@ -33,7 +33,7 @@ METHODS = ("lqr", "placement", "delayed")
 """How the gain is found; see `ControlSettings`."""
 
 CAPTURED = 1e-6
-"""Largest distance of a captured motion without noise, in the scales of the states."""
+"""Largest distance of a captured motion without noise, as a share of the largest state."""
 
 NOISE_REACH = 30.0
 """Largest distance of a captured motion with noise, in standard deviations of the noise."""
@@ -41,8 +41,11 @@ NOISE_REACH = 30.0
 QUIET = 1e-6
 """Noise that an estimate assumes where none is given, in the scales of the states."""
 
-BETWEEN_STARTS = 3
-"""Mesh periods between two starts of a record."""
+SPREAD = 1e-3
+"""Largest difference between the states from which starts are computed."""
+
+LEAST_TRANSIENT = 300
+"""Smallest number of mesh periods over which chaos separates them."""
 
 
 class ControlSettings(NamedTuple):
@@ -201,7 +204,8 @@ class Controller:
         Parameters
         ----------
         count : int
-            Number of states, three mesh periods apart.
+            Number of states. They come from motions that begin next to each other, which chaos
+            separates.
 
         Returns
         -------
@@ -214,17 +218,14 @@ class Controller:
         (5, 6)
         """
         count = whole_number("count", count, least=1)
-        apart = BETWEEN_STARTS * self.system.repeats_after
-        transient = self.system.config.integration.transient_periods
-        plan = self.system.plan
-        periods = count * apart
-        record = Plan(
-            plan.steps_per_period, transient, periods, periods, method=plan.method
-        )
-        outcome = kernels.integrate(
-            self.system.equations, self.system.state[np.newaxis], record
-        )
-        return outcome.every(apart).section[0]
+        repeats, plan = self.system.repeats_after, self.system.plan
+        transient = max(self.system.config.integration.transient_periods, LEAST_TRANSIENT)
+        transient = -(-transient // repeats) * repeats
+        lanes = self.system.equations.of(np.zeros(count, dtype=np.intp))
+        shifts = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (count, len(self.scales)))
+        begin = self.system.state + shifts
+        settle = Plan(plan.steps_per_period, transient, 0, 0, method=plan.method)
+        return kernels.integrate(lanes, begin, settle).end_state
 
     def run(self, starts: int | Floats = 1000, periods: int = 1000) -> ControlledMotion:
         """Integrate motions with control.
@@ -292,7 +293,7 @@ class Controller:
         for number, point in enumerate(points):
             # After mesh period n the excitation has the phase of point n + 1.
             first = (number - 1) % repeats
-            there = np.max(np.abs(section[:, first::repeats] - point) / self.scales, axis=2)
+            there = np.max(np.abs(section[:, first::repeats] - point), axis=2) / self.scales.max()
             distance[:, first::repeats] = np.fmin(distance[:, first::repeats], there)
         return distance
 
