@@ -44,9 +44,9 @@ class ControlOptions(NamedTuple):
     limit: Annotated[
         float, Option("largest change of the load, as a share of it (default: 0.1)", "SHARE")
     ] = 0.1
-    input_weight: Annotated[
-        float, Option("weight of the input in the cost (default: 10)", "R")
-    ] = 10.0
+    input_weight: Annotated[float, Option("weight of the input in the cost (default: 10)", "R")] = (
+        10.0
+    )
     measure: Annotated[
         tuple[str, ...], Option("state that is measured; may be repeated (default: all)", "STATE")
     ] = ()
@@ -86,7 +86,7 @@ def _control(options: ControlOptions) -> None:
         written = {
             name: [[one.real, one.imag] for one in value] if name in complex_names else value
             for name, value in facts.items()
-        }
+        } | {"input_shares": facts["input_shares"].tolist()}
         print(json.dumps(json_values(written), indent=1))
     else:
         print("\n".join(table(controller.system, facts)))

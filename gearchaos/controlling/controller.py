@@ -169,7 +169,7 @@ class Controller:
         (3, 1, 6)
         """
         lanes = whole_number("lanes", lanes, least=1)
-        given, (periods, states) = self.settings, self.gain.shape
+        given, periods = self.settings, len(self.gain)
         control = Control.of_states(
             np.tile(self.maps.points, (lanes, 1, 1)),
             np.tile(self.gain, (lanes, 1, 1)),
@@ -179,7 +179,8 @@ class Controller:
         names = self.system.states
         measured = [names.index(name) for name in given.measured or names]
         noise = given.noise * self.scales[measured]
-        seeds = np.random.SeedSequence(given.seed).generate_state(lanes, np.uint64)
+        seeds = np.empty(lanes, dtype=np.uint64)
+        seeds[:] = np.random.SeedSequence(given.seed).generate_state(lanes, np.uint64)
         control = control._replace(
             scales=np.tile(self.scales, (lanes, 1)),
             begins=given.begins,

@@ -112,9 +112,7 @@ def _tangent_ends(system: LaneSystem, points: Floats, plan: Plan, first: int) ->
     outcome = integrate(
         system.of(np.zeros(len(starts), dtype=np.intp)),
         starts,
-        Plan(
-            plan.steps_per_period, 0, 1, 1, tangent=True, method=plan.method, first_period=first
-        ),
+        Plan(plan.steps_per_period, 0, 1, 1, tangent=True, method=plan.method, first_period=first),
         tangent_start=vectors,
         control=control,
     )

@@ -89,9 +89,11 @@ def draw_section(axes: Axes, shown: ControlDrawing) -> None:
 
 def shown_periods(motion: ControlledMotion) -> int:
     """Return how many mesh periods to show of some starts: until all are captured, and a bit."""
-    whole = motion.inputs.shape[1]
+    whole = int(motion.inputs.shape[1])
     times = motion.capture_time[:SHOWN_STARTS]
-    return whole if (times < 0).any() else min(whole, int(1.3 * times.max()) + 20)
+    if (times < 0).any():
+        return whole
+    return min(whole, int(1.3 * float(times.max())) + 20)
 
 
 def draw_inputs(axes: Axes, shown: ControlDrawing) -> None:

@@ -156,7 +156,7 @@ def _integrate_share(
         np.stack([np.cos(phases), np.sin(phases)], axis=2),
     )
     # An empty array stands for no controller.
-    control = np.zeros(0)
+    control: Actuation | Floats = np.zeros(0)
     if begins.control:
         control = _actuation(begins.control, system, step, plan, outcome.inputs)
     schedule = Schedule(
@@ -191,8 +191,8 @@ def _actuation(
         for value in (1.0, 0.0)
     )
     about = np.array([column, plan.first_period, control.begins, control.repeats])
-    given = (getattr(control, name) for name in Actuation._fields[:-3])
-    return Actuation(*given, one - none, inputs, about)
+    given = {name: getattr(control, name) for name in Actuation._fields[:-3]}
+    return Actuation(**given, strength=one - none, inputs=inputs, about=about)
 
 
 def _columns(system: LaneSystem, plan: Plan) -> list[int]:
