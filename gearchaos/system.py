@@ -183,6 +183,16 @@ class System:
         return self._record
 
     @property
+    def equations(self) -> kernels.LaneSystem:
+        """The equations of motion as a batch of one lane for the kernels."""
+        return self._record
+
+    @property
+    def plan(self) -> Plan:
+        """The plan of the configured integration, without what a sweep records."""
+        return self._plan
+
+    @property
     def mesh_period(self) -> float:
         """Duration of a mesh period, 2 pi / Omega, in units of tau."""
         return float(self._record.mesh_period[0])

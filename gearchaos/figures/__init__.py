@@ -1,6 +1,7 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
 from gearchaos.figures.branches import add_branches, branches_page, draw_branches
+from gearchaos.figures.control import control_page
 from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall
 from gearchaos.figures.ensembles import basins, basins_page, fractions, shares, shares_page
 from gearchaos.figures.maps import map_page, parameter_map

@@ -1,11 +1,14 @@
 """Integrate a batch: split lanes into blocks, run the blocks in parallel, return arrays."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
+from gearchaos_kernels.control import Actuation, Control
 from gearchaos_kernels.methods.protocol import Share
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.lane_system import LaneSystem
@@ -20,7 +23,7 @@ LARGEST_GROWTH = 200.0
 
 
 @driver
-def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
+def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, control, scene):
     """Integrate all blocks; ``next_block``, shape (1,), counts those that threads have taken.
 
     Every thread takes the next block when it has finished one. Blocks take different times: some
@@ -31,12 +34,12 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
     for _ in prange(threads):
         number = count_up(next_block)
         while number < batch.blocks.shape[0]:
-            integrate_block(number, batch, tables, plan, outcome, scene)
+            integrate_block(number, batch, tables, plan, outcome, control, scene)
             number = count_up(next_block)
 
 
-def scene_of(system: LaneSystem, plan: Plan) -> Scene:
-    """Return the scene that a system and a plan need."""
+def scene_of(system: LaneSystem, plan: Plan, control: Control | None = None) -> Scene:
+    """Return the scene that a system, a plan and a controller need."""
     method, flags = METHODS[plan.method], system.flags()
     model = provider_of(flags)
     switches = model.switches(flags)
@@ -52,11 +55,18 @@ def scene_of(system: LaneSystem, plan: Plan) -> Scene:
         before=flag(resolved or any(one.reads_before for one in wanted)),
         switches=flag(switches),
         jumps=flag(resolved and any(kind.damped_in_contact for kind in model.kinds_of(flags))),
+        control=flag(control),
+        feedback=control.flags() if control else None,
     )
 
 
 def integrate(
-    system: LaneSystem, start: Floats, plan: Plan, *, tangent_start: Floats | None = None
+    system: LaneSystem,
+    start: Floats,
+    plan: Plan,
+    *,
+    tangent_start: Floats | None = None,
+    control: Control | None = None,
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0.
 
@@ -70,6 +80,8 @@ def integrate(
         Method, steps, periods, and what is recorded.
     tangent_start : array, shape (lanes, states), optional
         Tangent vectors at tau = 0; by default all components are equal and the length is 1.
+    control : Control, optional
+        The controller of every lane; by default there is none.
 
     Returns
     -------
@@ -80,8 +92,8 @@ def integrate(
     ------
     ValueError
         If the method cannot integrate the system, see `LaneSystem.refuses_maps`, if amplitudes are
-        requested of a model without observed signals, or if the system is beyond what the model
-        supports.
+        requested of a model without observed signals, if a model without a steady input is
+        controlled, or if the system is beyond what the model supports.
 
     Examples
     --------
@@ -94,29 +106,37 @@ def integrate(
     lanes, states = start.shape[0], len(system.states)
     if tangent_start is None:
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
-    scene = scene_of(system, plan)
+    scene = scene_of(system, plan, control)
+    if control and not provider_of(scene.model).actuated:
+        raise ValueError("control needs a model with a steady input")
     if plan.orders and not provider_of(scene.model).observed:
         raise ValueError("amplitudes need a model with an observed signal")
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
+    begins = _Beginning(start, tangent_start, control)
     for share in METHODS[plan.method].prepare(system, plan, scene):
         steps_taken[share.order] = share.steps[share.order]
-        _integrate_share(system, share, (start, tangent_start), plan, outcome, scene)
+        _integrate_share(system, share, begins, plan, outcome, scene)
     return _per_tau(system, plan, outcome, steps_taken, scene)
+
+
+class _Beginning(NamedTuple):
+    """States and tangent vectors at tau = 0, both (lanes, states), and the controllers."""
+
+    start: Floats
+    tangent_start: Floats
+    control: Control | None
 
 
 def _integrate_share(
     system: LaneSystem,
     share: Share,
-    starts: tuple[Floats, Floats],
+    begins: _Beginning,
     plan: Plan,
     outcome: Outcome,
     scene: Scene,
 ) -> None:
-    """Integrate some lanes and write what is recorded of them into an outcome.
-
-    ``starts``: states and tangent vectors at tau = 0, both of shape (lanes, states).
-    """
-    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in starts)
+    """Integrate some lanes and write what is recorded of them into an outcome."""
+    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in begins[:2])
     chosen = np.array([*_columns(system, plan), _observed_row(scene)], dtype=np.intp)
     orders = np.array([float(order) for order in plan.orders])
     phases = 2.0 * np.pi * orders / share.steps[:, np.newaxis]
@@ -135,6 +155,10 @@ def _integrate_share(
         chosen,
         np.stack([np.cos(phases), np.sin(phases)], axis=2),
     )
+    # An empty array stands for no controller.
+    control: Actuation | Floats = np.zeros(0)
+    if begins.control:
+        control = _actuation(begins.control, system, step, plan, outcome.inputs)
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
@@ -147,11 +171,28 @@ def _integrate_share(
         anew = share.order[np.repeat(share.progress[:, 0] == 0.0, share.blocks[:, 1])]
         outcome.status[anew], outcome.diverged_period[anew] = Status.OK, -1
     tables, next_block = system.tables(plan.steps_per_period), np.zeros(1, dtype=np.intp)
-    _integrate_blocks(get_num_threads(), next_block, batch, tables, schedule, outcome, scene)
+    _integrate_blocks(
+        get_num_threads(), next_block, batch, tables, schedule, outcome, control, scene
+    )
     if share.maps.size:
         unmapped = np.isnan(share.maps[share.blocks[:, 3]])
         lost = np.repeat(unmapped, share.blocks[:, 1])
         outcome.status[share.order[lost]] = Status.TOO_FAST
+
+
+def _actuation(
+    control: Control, system: LaneSystem, step: Floats, plan: Plan, inputs: Floats
+) -> Actuation:
+    """Return controllers with how their input acts on lanes; ``step``, ``inputs`` as in a batch."""
+    model = provider_of(system.flags())
+    column = model.lane._fields.index(model.actuated)
+    one, none = (
+        system.with_steady_input(np.full(system.lanes, value)).coefficients(step)[:, column]
+        for value in (1.0, 0.0)
+    )
+    about = np.array([column, plan.first_period, control.begins, control.repeats])
+    given = {name: getattr(control, name) for name in Actuation._fields[:-3]}
+    return Actuation(**given, strength=one - none, inputs=inputs, about=about)
 
 
 def _columns(system: LaneSystem, plan: Plan) -> list[int]:
@@ -164,6 +205,7 @@ def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
     elements = provider_of(scene.model).elements(scene.model)
     kept, loads = plan.history_periods, scene.recorders.loads
     in_contact = elements if scene.recorders.contact else 0
+    total = plan.transient_periods + plan.recorded_periods
     return Outcome(
         # The threads write every element, so zero-filling would be wasted.
         section=np.empty((lanes, plan.section_points, states)),
@@ -179,6 +221,7 @@ def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
         loads=np.full((lanes, signals_of(scene) if loads else 0, SIGNAL_ROWS), np.nan),
         extremes=np.full((lanes, len(plan.states), 2), np.nan),
         amplitudes=np.full((lanes, (len(plan.states) + 1) * len(plan.orders)), np.nan),
+        inputs=np.zeros((lanes, total if scene.control else 0)),
         history=np.empty((lanes, kept and kept * plan.steps_per_period + 1, states)),
     )
 

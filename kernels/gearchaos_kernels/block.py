@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact.branches import branches_at
+from gearchaos_kernels.control import act, scale_variations
 from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill,
@@ -102,8 +103,11 @@ class Batch(NamedTuple):
 
 
 @part
-def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
-    """Integrate the lanes of a block, and write what is recorded of them into the outcome."""
+def integrate_block(number_of_block, batch, tables, plan, outcome, control, scene):
+    """Integrate the lanes of a block, and write what is recorded of them into the outcome.
+
+    ``control``: the `Actuation`, if the scene has a controller.
+    """
     align_stack()
     about = batch.blocks[number_of_block]
     first, lanes, steps, maps_at = about[0], about[1], about[2], about[3]
@@ -121,6 +125,8 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
     for period in range(resumed(memory, block, progress, given, scene), periods):
         keep_progress(memory, block, progress, period, scene)
         recorded = period - plan.transient_periods
+        if scene.control is not None:
+            act(memory, block, period, batch, control, given, scene)
         clock = Clock(period, 0, steps, substeps, recorded, periods - 1 - period)
         begin_record(memory, block, clock, records, scene)
         for number in range(steps):
@@ -242,6 +248,8 @@ def scale_tangents(memory, block, batch, steps_done, last, scene):
         for column in range(scale.shape[0]):
             square += (memory[(first + column) * STRIDE + slot] * scale[column]) ** 2
         length = math.sqrt(square)
+        if scene.control is not None:
+            scale_variations(memory, slot, length, scene)
         for column in range(scale.shape[0]):
             part = memory[(first + column) * STRIDE + slot] / length
             # Flush tiny components before they become denormal.

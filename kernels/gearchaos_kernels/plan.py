@@ -161,6 +161,8 @@ class Outcome(NamedTuple):
         Minimum and maximum of each of these states in the recorded periods.
     amplitudes : array, shape (lanes, states of the plan + 1, orders)
         Amplitudes of these states and then of the first observed signal.
+    inputs : array, shape (lanes, all periods) or (lanes, 0)
+        The input of a controller in every mesh period, transient included.
     history : array, shape (lanes, history periods times steps + 1, states) or (lanes, 0, states)
         The state at every step of the last mesh periods.
     """
@@ -178,6 +180,7 @@ class Outcome(NamedTuple):
     loads: Floats
     extremes: Floats
     amplitudes: Floats
+    inputs: Floats
     history: Floats
 
     def every(self, periods: int) -> Self:

@@ -42,6 +42,10 @@ class Scene:
         Whether the equations of a lane switch at known moments of the mesh period.
     jumps : True or None
         Whether the force of some element jumps where a contact begins or ends.
+    control : True or None
+        Whether a controller chooses an input of every lane.
+    feedback : Feedback or None
+        What the loop contains of the controller, see `control`.
     """
 
     model: Any
@@ -53,11 +57,14 @@ class Scene:
     before: Any
     switches: Any = None
     jumps: Any = None
+    control: Any = None
+    feedback: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""
         recorders = type(self.recorders)()
-        return replace(self, tangent=None, before=None, recorders=recorders)
+        nothing = dict.fromkeys(("tangent", "before", "control", "feedback"))
+        return replace(self, recorders=recorders, **nothing)
 
 
 class SceneType(types.Opaque):  # type: ignore[misc]

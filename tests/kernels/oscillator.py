@@ -51,6 +51,7 @@ OSCILLATOR = Model(
         Gap(state.position.x, state.rate.x, state.rate.x),
     ),
     accelerations=lambda _state, pushes, drive, _lane, _scene: X(drive - pushes[0].force),
+    actuated="load",
     observed=("x",),
     observed_at=lambda state, _lane, _phase, _scene: (state.position.x,),
     maps=MapFormulas(inputs_of=lambda lane, _scene: (lane.load, lane.amplitude * lane.speed**2)),

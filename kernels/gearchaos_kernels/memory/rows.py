@@ -80,8 +80,8 @@ class Rows(NamedTuple):
     crossings : int
         Number of recorded crossings, the smallest speed at one of them, and the number of steps
         with more than `MOST_CROSSINGS`.
-    model, method, recorders : int
-        Rows that the model, the method and the recorders use for themselves.
+    model, method, recorders, control : int
+        Rows that the model, the method, the recorders and a controller use for themselves.
     total : int
         Number of rows.
     """
@@ -97,12 +97,63 @@ class Rows(NamedTuple):
     model: int
     method: int
     recorders: int
+    control: int
     total: int
 
     @property
     def before(self) -> int:
         """Distance from a row of state or tangent vector to its value before the step."""
         return self.state_before
+
+
+class ControlRows(NamedTuple):
+    """First rows of what a controller stores of every lane.
+
+    Attributes
+    ----------
+    varied : int
+        Variation of the input along the tangent vector, scaled as the steady input of a lane.
+    known, known_varied : int
+        What the controller knows of the state, and the same of the tangent vector.
+    kept, kept_varied : int
+        What it keeps until the next mesh period, and the variation of that.
+    end : int
+        The row after the last one.
+    delay : int
+        Mesh periods of a delayed feedback.
+    """
+
+    varied: int
+    known: int
+    known_varied: int
+    kept: int
+    kept_varied: int
+    end: int
+    delay: int
+
+
+def control_rows_of(scene: Scene) -> ControlRows:
+    """Return the rows that a controller uses in a block."""
+    first, states, kept = rows_of(scene).control, scene.feedback.states, scene.feedback.kept
+    known = first + 1
+    last = known + 2 * states
+    return ControlRows(
+        varied=first,
+        known=known,
+        known_varied=known + states,
+        kept=last,
+        kept_varied=last + kept,
+        end=last + 2 * kept,
+        delay=scene.feedback.delay,
+    )
+
+
+def _control_size(scene: Scene) -> int:
+    """Return the number of rows that a controller uses in a block."""
+    if scene.control is None:
+        return 0
+    size: int = 1 + 2 * scene.feedback.states + 2 * scene.feedback.kept
+    return size
 
 
 @cache
@@ -124,6 +175,7 @@ def rows_of(scene: Scene) -> Rows:
         "model": model.rows(scene.model),
         "method": provider_of(scene.method).rows(scene),
         "recorders": provider_of(scene.recorders).rows(scene),
+        "control": _control_size(scene),
     }
     first, at = {}, 0
     for name, size in sizes.items():
@@ -152,3 +204,6 @@ def constants(record: Any) -> Any:
 
 rows = constants(rows_of)
 """`Rows` of a scene, as constants of compiled code."""
+
+control_rows = constants(control_rows_of)
+"""`ControlRows` of a scene, as constants of compiled code."""

@@ -56,6 +56,12 @@ def no_drive(lane, scene):
 
 
 @scalar
+def drive_alone(lane, drive, scene):
+    """Return a drive as what acts on a lane."""
+    return drive
+
+
+@scalar
 def clearances_of_elements(lane, scene):
     """Return the half clearance of each element."""
     return each(clearance_of, elements_at(lane, unforced(lane, scene), scene))

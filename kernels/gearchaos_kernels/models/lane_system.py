@@ -242,6 +242,20 @@ class LaneSystem(ABC):
         """Return the names of the parameters of the lanes."""
         return [field.name for field in fields(self)]  # type: ignore[arg-type]
 
+    def with_steady_input(self, values: Floats) -> Self:
+        """Return the system with other steady inputs, shape (lanes,), in place of its own.
+
+        The steady input of a model is the parameter behind `Model.actuated`, which has its name by
+        default. A controller adds its own input to it.
+        """
+        return self.replace(**{provider_of(self.flags()).actuated: values})
+
+    @property
+    def steady_input(self) -> Floats:
+        """The steady input of every lane, shape (lanes,); see `with_steady_input`."""
+        value: Floats = getattr(self, provider_of(self.flags()).actuated)
+        return value
+
     # Flow maps use all of the following.
 
     def refuses_maps(self) -> str:

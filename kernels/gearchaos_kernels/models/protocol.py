@@ -120,6 +120,11 @@ class Model:
     forcing_at(lane, point, scene), unforced(lane, scene)
         What acts on a lane at a mesh phase; the same without excitation and with mean stiffness. By
         default the forcing is one number, the drive, and 0 if unforced.
+    driven(lane, drive, scene)
+        What acts on an unforced lane by a steady input; by default the input itself.
+    actuated : str
+        Name of the coefficient of a lane that is its steady input, to which a controller adds its
+        own; by default a lane has none.
     from_kept(state, forcing, scene), to_kept(state, forcing, scene)
         A state in the coordinates of the equations from one as it is stored, and back. By default
         both are the same.
@@ -168,6 +173,8 @@ class Model:
     point_within: Any = mesh_phase.point_within
     forcing_at: Any
     unforced: Any = defaults.no_drive
+    driven: Any = defaults.drive_alone
+    actuated: str = ""
     from_kept: Any = defaults.same_state
     to_kept: Any = defaults.same_state
     kept_accelerations: Any = defaults.same_accelerations

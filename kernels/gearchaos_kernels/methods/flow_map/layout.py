@@ -131,7 +131,8 @@ def layout_of(scene: Scene) -> Layout:
     bound_size = -(-columns // _VECTOR) * _VECTOR
     header = bounds + elements * bound_size
     tangent_inputs = -(-columns // _VECTOR) * _VECTOR
-    result = tangent_inputs + -(-states // _VECTOR) * _VECTOR
+    # One more for the variation of the steady input.
+    result = tangent_inputs + -(-(states + 1) // _VECTOR) * _VECTOR
     return Layout(
         states=states,
         inputs=inputs,

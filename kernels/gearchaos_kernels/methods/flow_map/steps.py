@@ -9,7 +9,14 @@ import math
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import suspects_of
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, state_before, state_of
-from gearchaos_kernels.memory.rows import STATE, STRIDE, VECTOR, Branch, rows
+from gearchaos_kernels.memory.rows import (
+    STATE,
+    STRIDE,
+    VECTOR,
+    Branch,
+    control_rows,
+    rows,
+)
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
@@ -119,6 +126,9 @@ def gather(memory, numbers, scene):
         numbers[line] = memory[(at.state_before + line) * STRIDE]
         if scene.tangent is not None:
             numbers[place.tangent_inputs + line] = memory[(at.tangent_before + line) * STRIDE]
+    if scene.control is not None:
+        varied = memory[control_rows(scene).varied * STRIDE]
+        numbers[place.tangent_inputs + place.states] = varied
     for number in range(place.columns - place.states):
         row = method_rows(scene).inputs + number
         numbers[place.states + number] = memory[row * STRIDE]

@@ -17,7 +17,14 @@ from numba.core.cgutils import for_range
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH, first_element
-from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, rows_of
+from gearchaos_kernels.memory.rows import (
+    BRANCH,
+    STATE,
+    STRIDE,
+    VECTOR,
+    control_rows_of,
+    rows_of,
+)
 from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_of, layout_of, method_rows_of
 from gearchaos_kernels.scene import Scene, provider_of
 
@@ -33,10 +40,11 @@ def _inputs(scene: Scene) -> list[int]:
     ]
 
 
-def _tangent_inputs(scene: Scene) -> range:
-    """Return the rows of the tangent vector before the step."""
+def _tangent_inputs(scene: Scene) -> list[int]:
+    """Return the rows of the tangent vector before the step, and of what varies its input."""
     first = rows_of(scene).tangent_before
-    return range(first, first + layout_of(scene).states)
+    varied = [control_rows_of(scene).varied] if scene.control else []
+    return [*range(first, first + layout_of(scene).states), *varied]
 
 
 class _Writer:
@@ -465,7 +473,7 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
     model = provider_of(scene.scene.model)
     copied = [*range(at.state_before, at.state_before + place.states)]
     if scene.scene.tangent is not None:
-        copied += range(at.tangent_before, at.tangent_before + place.states)
+        copied += _tangent_inputs(scene.scene)
     copied += [at.coefficients + column for column in model.gap_columns(scene.scene.model)]
     copied += range(at.branches, at.branches + BRANCH * place.elements)
     copied += [at.suspect]
@@ -505,13 +513,14 @@ def margins_of(_typing, memory, slot, scene):
 def _combination(forced: bool) -> Any:
     """Return an intrinsic that sums the columns of a map times their factors, for one lane.
 
-    ``forced``: whether it includes the columns of inputs and offsets.
+    ``forced``: whether it includes the columns of inputs and offsets; those of a tangent vector
+    end with the steady input, if a controller varies it.
     """
 
     @intrinsic
     def combine(_typing, numbers, target, inputs, maps, maps_at, scene):
         place = layout_of(scene.scene)
-        columns = range(place.columns if forced else place.states)
+        columns = range(place.columns if forced else len(_tangent_inputs(scene.scene)))
 
         def generate(context, builder, signature, arguments):
             w = _Writer(context, builder, signature, arguments)

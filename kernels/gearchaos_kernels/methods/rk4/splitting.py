@@ -60,6 +60,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
     branches = read_branches(memory, slot, scene)
+    varied = rk4.varied_input(memory, slot, scene)
     crossings = 0
     while True:
         left = until - done
@@ -74,7 +75,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
         crossing = forcing_within(memory, slot, lane, tables, number, done, scene)
         during = begin, middle, middle, crossing
         state, pushes = rk4.advance(rk4.motion_stage, state, piece, lane, during, branches, scene)
-        tangent = advance_tangent(tangent, piece, lane, pushes, scene)
+        tangent = advance_tangent(tangent, piece, lane, pushes, varied, scene)
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, scene)
@@ -88,7 +89,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
         after, pushes = rk4.advance(rk4.motion_stage, state, left, lane, during, branches, scene)
         write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
         if scene.tangent is not None:
-            tangent_after = advance_tangent(tangent, left, lane, pushes, scene)
+            tangent_after = advance_tangent(tangent, left, lane, pushes, varied, scene)
             write_state(memory, rows(scene).tangent, slot, tangent_after, scene)
     if crossings > 0:
         write_branches(memory, slot, branches_at(gaps_after, lane, scene), scene)
@@ -106,11 +107,11 @@ def pass_crossing(memory, slot, element, gaps, tangent, branches, moment, scene)
 
 
 @scalar
-def advance_tangent(tangent, fraction, lane, pushes, scene):
+def advance_tangent(tangent, fraction, lane, pushes, varied, scene):
     """Return a tangent vector a fraction of a step later, unchanged if the scene has none."""
     if scene.tangent is None:
         return tangent
-    after, _ = rk4.advance(rk4.tangent_stage, tangent, fraction, lane, pushes, None, scene)
+    after, _ = rk4.advance(rk4.tangent_stage, tangent, fraction, lane, pushes, varied, scene)
     return after
 
 

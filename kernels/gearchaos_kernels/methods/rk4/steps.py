@@ -15,9 +15,15 @@ For a whole step s is the constant 1, which the compiler removes.
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.elements import pushes_of, tangent_pushes
-from gearchaos_kernels.memory.rows import State
+from gearchaos_kernels.memory.rows import STRIDE, State, control_rows
 from gearchaos_kernels.memory.tuples import along
-from gearchaos_kernels.models.interfaces import accelerations, elements_at, gaps_at, unforced
+from gearchaos_kernels.models.interfaces import (
+    accelerations,
+    driven,
+    elements_at,
+    gaps_at,
+    unforced,
+)
 
 
 @scalar
@@ -25,7 +31,8 @@ def advance(stage, state, s, lane, given, branches, scene):
     """Advance a state by a fraction s of a step; return it and the pushes of its four stages.
 
     ``stage``: `motion_stage` for a state or `tangent_stage` for a tangent vector; ``given``: for
-    each stage the forcing, or for a tangent vector the pushes of the motion.
+    each stage the forcing, or for a tangent vector the pushes of the motion; ``branches``: the
+    contact branches, or for a tangent vector the variation of the steady input.
     """
     y, w = state
     a1, pushes1 = stage(state, lane, given[0], branches, scene)
@@ -53,10 +60,20 @@ def motion_stage(state, lane, forcing, branches, scene):
 
 
 @scalar
-def tangent_stage(vector, lane, pushes, _branches, scene):
+def tangent_stage(vector, lane, pushes, varied, scene):
     """Return the accelerations of a tangent vector, per step squared, and the given pushes."""
     added = tangent_pushes(vector, lane, pushes, scene)
-    return accelerations(vector, added, unforced(lane, scene), lane, scene), pushes
+    if scene.control is None:
+        return accelerations(vector, added, unforced(lane, scene), lane, scene), pushes
+    return accelerations(vector, added, driven(lane, varied, scene), lane, scene), pushes
+
+
+@scalar
+def varied_input(memory, slot, scene):
+    """Return the variation of the steady input along the tangent vector, None without control."""
+    if scene.control is None:
+        return None
+    return memory[control_rows(scene).varied * STRIDE + slot]
 
 
 @scalar

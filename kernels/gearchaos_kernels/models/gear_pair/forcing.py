@@ -148,6 +148,12 @@ def unforced(lane, scene):
 
 
 @scalar
+def driven(lane, drive, scene):
+    """Return the forcing of a mesh of mean stiffness by a load alone."""
+    return Forcing(lane.mean_stiffness, drive, 0.0, 0.0, 0.0, 0.0)
+
+
+@scalar
 def pitch_error_at(lane, point, scene):
     """Return e at a mesh phase.
 

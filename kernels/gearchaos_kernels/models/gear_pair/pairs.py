@@ -194,6 +194,15 @@ class GearPairs(LaneSystem):
         force: Floats = self.groups.load / np.cos(self.groups.base_helix_angle)
         return force
 
+    def with_steady_input(self, values: Floats) -> Self:
+        """Return the pairs with other loads."""
+        return self.replace(groups=self.groups._replace(load=values))
+
+    @property
+    def steady_input(self) -> Floats:
+        """The load of every pair."""
+        return self.groups.load
+
     def of_unit_inputs(self) -> Self:
         """Return the system with unit inputs, from which flow maps are computed."""
         unit = {name: np.full(self.lanes, value) for name, value in _UNIT_GROUPS.items()}

@@ -1,0 +1,194 @@
+"""Keep a gear pair on a periodic orbit by small changes of its load, once per mesh period.
+
+A periodic orbit of the motion is found, usually an unstable one within chaos. A linear controller
+is designed from the linearised map over a mesh period, and tried from many states of the motion
+without control. The command prints the multipliers with and without control, the share of the
+starts that it captures with its 95 % interval, the time and effort this takes, and contact, loads
+and transmission error before and after.
+
+The controller knows all states, or measures those of --measure and estimates the others. The load
+changes only where less than --limit is needed, and is constant over a mesh period.
+
+The table goes to stdout, everything else to stderr. With --output, a figure is drawn as well.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+from gearchaos.command_line import Command
+from gearchaos.errors import ConfigurationError
+from gearchaos.options import ConfigFile, Option, Overwrite, Place, Threads
+
+if TYPE_CHECKING:
+    from gearchaos.controlling.controller import Controller
+    from gearchaos.system import System
+
+
+class ControlOptions(NamedTuple):
+    """Options of ``gearchaos control``."""
+
+    config: ConfigFile
+    at: Annotated[
+        tuple[Place, ...],
+        Option("value of a swept parameter; may be repeated", "NAME=VALUE"),
+    ] = ()
+    period: Annotated[int, Option("period of the orbit (default: 1)", "N", low=1, high=64)] = 1
+    orbit: Annotated[
+        int, Option("which orbit of this period, the least unstable is 0", "K", low=0)
+    ] = 0
+    method: Annotated[
+        Literal["lqr", "placement", "delayed"],
+        Option("linear-quadratic gain (default), pole placement, or delayed feedback"),
+    ] = "lqr"
+    limit: Annotated[
+        float, Option("largest change of the load, as a share of it (default: 0.1)", "SHARE")
+    ] = 0.1
+    input_weight: Annotated[float, Option("weight of the input in the cost (default: 10)", "R")] = (
+        10.0
+    )
+    measure: Annotated[
+        tuple[str, ...], Option("state that is measured; may be repeated (default: all)", "STATE")
+    ] = ()
+    noise: Annotated[
+        float, Option("standard deviation of the noise, in scales of the states", "SHARE")
+    ] = 0.0
+    seed: Annotated[int, Option("seed of the noise (default: 0)", "N", low=0)] = 0
+    starts: Annotated[int, Option("number of starts (default: 1000)", "N", low=1, high=10**6)] = (
+        1000
+    )
+    periods: Annotated[int, Option("mesh periods (default: 1000)", "N", low=1, high=10**7)] = 1000
+    output: Annotated[
+        Path | None,
+        Option("draw a figure, such as control.png", "FIGURE", ("-o", "--output"), file=True),
+    ] = None
+    json: Annotated[bool, Option("print JSON")] = False
+    overwrite: Overwrite = False
+    threads: Threads = None
+
+
+def _control(options: ControlOptions) -> None:
+    from gearchaos.controlling.trial import facts_of, try_controller
+    from gearchaos.engine.running import choose_threads, compiling
+    from gearchaos.figures.control import control_page
+    from gearchaos.figures.page import check_figures, save_figure
+    from gearchaos.results.reading.overview import json_values
+
+    choose_threads(options.threads)
+    if options.output:
+        check_figures([options.output], [options.config], options.overwrite)
+    with compiling():
+        controller = _controller(options)
+        trial = try_controller(controller, options.starts, options.periods)
+    facts = facts_of(trial)
+    if options.json:
+        complex_names = ("multipliers", "closed_multipliers")
+        written = {
+            name: [[one.real, one.imag] for one in value] if name in complex_names else value
+            for name, value in facts.items()
+        } | {"input_shares": facts["input_shares"].tolist()}
+        print(json.dumps(json_values(written), indent=1))
+    else:
+        print("\n".join(table(controller.system, facts)))
+    if options.output:
+        save_figure(control_page(trial.drawing()), options.output)
+
+
+def _controller(options: ControlOptions) -> "Controller":
+    """Return the controller that the options describe."""
+    from gearchaos.controlling.controller import Controller, ControlSettings
+    from gearchaos.models import load_config
+    from gearchaos.system import System
+
+    config = load_config(options.config)
+    swept = [sweep.parameter for sweep in config.sweeps.values()]
+    system = System(config, _values(options.at, swept))
+    orbits = system.orbits(options.period)
+    if options.orbit >= len(orbits):
+        raise ConfigurationError(
+            f"{options.config}: {len(orbits)} orbits of period {options.period} were found near "
+            f"the motion, and --orbit {options.orbit} is not among them; choose another --period "
+            "or --orbit"
+        )
+    settings = ControlSettings(
+        method=options.method,
+        input_weight=options.input_weight,
+        limit=options.limit,
+        measured=options.measure,
+        noise=options.noise,
+        seed=options.seed,
+    )
+    return Controller(system, orbits[options.orbit], settings)
+
+
+def _values(places: tuple[Place, ...], swept: list[str]) -> dict[str, float]:
+    """Return the value of each parameter; one without a name belongs to the only swept one."""
+    unnamed = [place for place in places if not place.axis]
+    if unnamed and len(swept) != 1:
+        raise ConfigurationError(
+            f"--at {unnamed[0].value:g}: several parameters are swept; write NAME=VALUE"
+        )
+    return {place.axis or swept[0]: place.value for place in places}
+
+
+MEASURES = {
+    "load_factor_largest": "load factor",
+    "transmission_error_peak_to_peak": "transmission error, peak to peak",
+}
+"""Names of the outputs that are compared, in words; those of contact loss follow."""
+
+
+def table(system: "System", facts: dict[str, Any]) -> list[str]:
+    """Return what a trial found as lines of text."""
+    lines = [f"orbit of period {facts['period']}", "  multipliers      with control     input acts"]
+    rows = zip(
+        facts["multipliers"], facts["closed_multipliers"], facts["input_shares"], strict=True
+    )
+    lines += [f"  {_number(a):16} {_number(b):16} {share:.1e}" for a, b, share in rows]
+    lines += [
+        f"captured: {facts['captured']} of {facts['starts']} starts, "
+        f"{_percent(facts['captured_share'])} ({_percent(facts['captured_low'])} to "
+        f"{_percent(facts['captured_high'])}) after {facts['mesh_periods']} mesh periods"
+    ]
+    if facts["captured"]:
+        lines += [
+            f"capture takes {facts['capture_median']:.0f} mesh periods (median), "
+            f"{facts['capture_95_percent']:.0f} for 95 %"
+        ]
+    lines += [
+        f"largest change of the load {_effort(system, facts['largest_effort'])}, mean "
+        f"{_effort(system, facts['mean_effort'])}"
+    ]
+    if facts["captured"]:
+        lines += [f"once captured {_effort(system, facts['final_effort'])}"]
+    lines += ["                                     before   after"]
+    for name, value in facts["before"].items():
+        words = MEASURES.get(name)
+        if name.startswith("contact_loss"):
+            words = name.replace("_", " ")
+        if words and name in facts["after"]:
+            lines += [f"  {words:34} {value:<8.4g} {facts['after'][name]:.4g}"]
+    return lines
+
+
+def _number(value: complex) -> str:
+    """Return a multiplier as text."""
+    if abs(value.imag) < 1e-12:
+        return f"{value.real:.4f}"
+    return f"{value.real:.4f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.4f}i"
+
+
+def _percent(share: float) -> str:
+    """Return a share as a percentage."""
+    return f"{100.0 * share:.1f} %"
+
+
+def _effort(system: "System", share: float) -> str:
+    """Return a share of the load as a percentage, and as a torque where the pair has one."""
+    operation = getattr(system.config, "operation", None)
+    torque = getattr(operation, "torque_Nm", None)
+    physical = f" ({abs(torque) * share:.3g} N m)" if torque else ""
+    return f"{100.0 * share:.3g} %{physical}"
+
+
+main = Command("control", __doc__, ControlOptions, _control).start(__name__)

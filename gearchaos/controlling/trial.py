@@ -1,0 +1,150 @@
+"""Try a controller from many starts: its capture, its effort, and what it changes."""
+
+from typing import Any, NamedTuple
+
+import gearchaos_kernels as kernels
+import numpy as np
+
+from gearchaos.arrays import Floats
+from gearchaos.controlling.controller import Controller
+from gearchaos.engine.run_plan import plan_run
+from gearchaos.figures.control import ControlDrawing
+from gearchaos.outputs.catalogue import SECTION_PART
+from gearchaos.records.contact import contact_summary
+from gearchaos.records.control import ControlledMotion
+from gearchaos.records.wilson import wilson_interval
+
+COMPARED_PERIODS = 200
+"""Mesh periods over which motions with and without control are compared."""
+
+SHOWN_PERIODS = 40
+"""Excitation periods of the motions that are drawn."""
+
+
+class ControlTrial(NamedTuple):
+    """A controller tried from many starts.
+
+    Attributes
+    ----------
+    controller : Controller
+        The controller.
+    motion : ControlledMotion
+        The motions with control.
+    free, held : array, shape (samples, states)
+        The last mesh periods of a motion without control, and of one with it.
+    before, after : dict of str to float
+        Means over all starts of contact, loads and transmission error, without control and after
+        the trial.
+    """
+
+    controller: Controller
+    motion: ControlledMotion
+    free: Floats
+    held: Floats
+    before: dict[str, float]
+    after: dict[str, float]
+
+    def drawing(self) -> ControlDrawing:
+        """Return what a page shows of the trial.
+
+        Returns
+        -------
+        ControlDrawing
+            See `figures.control_page`.
+
+        Examples
+        --------
+        ::
+
+            gearchaos.figures.control_page(trial.drawing())
+        """
+        controller = self.controller
+        symbols = catalogue_symbols(controller)
+        return ControlDrawing(
+            self.motion, controller.load, controller.maps.points, self.free, self.held, symbols
+        )
+
+
+def try_controller(controller: Controller, starts: int, periods: int) -> ControlTrial:
+    """Integrate motions from many starts with control, and compare them with those without."""
+    begin = controller.starts(starts)
+    motion = controller.run(begin, periods)
+    end = motion.section[:, -1]
+    shown = SHOWN_PERIODS * controller.system.repeats_after
+    plan = controller.system.plan._replace(
+        transient_periods=0, recorded_periods=shown, section_points=0, history_periods=shown
+    )
+    best = int(np.argmin(motion.distance[:, -1]))
+    free = kernels.integrate(controller.system.equations, begin[:1], plan)
+    held = controller.integrate(end[best : best + 1], plan)
+    return ControlTrial(
+        controller,
+        motion,
+        free.history[0],
+        held.history[0],
+        _measures(controller, begin, controlled=False),
+        _measures(controller, end, controlled=True),
+    )
+
+
+def catalogue_symbols(controller: Controller) -> tuple[str, str]:
+    """Return the symbols of the first state and of its rate."""
+    run = plan_run(controller.system.config)
+    states = run.lanes.model.catalogue.variables((), {SECTION_PART: run.lanes.states})
+    named = {one.name: one.symbol for one in states}
+    first, rate = (named[f"section_{name}"] for name in controller.system.states[:2])
+    return first, rate
+
+
+def _measures(controller: Controller, states: Floats, *, controlled: bool) -> dict[str, float]:
+    """Return means over lanes of contact, loads and transmission error, by name."""
+    run = plan_run(controller.system.config)
+    whole = controller.system.repeats_after
+    periods = -(-COMPARED_PERIODS // whole) * whole
+    plan = controller.system.plan._replace(
+        transient_periods=0,
+        recorded_periods=periods,
+        section_points=0,
+        loads=True,
+        contact=controller.system.equations.clearance,
+    )
+    system = controller.system.equations.of(np.zeros(len(states), dtype=np.intp))
+    control = controller.control(len(states)) if controlled else None
+    outcome = kernels.integrate(system, states, plan, control=control)
+    found: dict[str, Any] = dict(run.lanes.model.loads(outcome.loads, system))
+    for number, element in enumerate(run.elements if plan.contact else ()):
+        summary = contact_summary(outcome.contact[:, number], periods)
+        found |= {f"{name}_{element}": values for name, values in summary.items()}
+    return {
+        name: float(np.mean(values))
+        for name, values in found.items()
+        if np.issubdtype(values.dtype, np.floating) and np.isfinite(values).all()
+    }
+
+
+def facts_of(trial: ControlTrial) -> dict[str, Any]:
+    """Return what a trial found, by name; inputs are shares of the load."""
+    controller, motion = trial.controller, trial.motion
+    captured = int(motion.captured.sum())
+    share = np.abs(motion.inputs) / abs(controller.load)
+    low, high = wilson_interval(captured, len(motion.captured)).tolist()
+    times = motion.capture_time[motion.captured]
+    return {
+        "period": controller.orbit.period,
+        "multipliers": controller.multipliers,
+        "input_shares": controller.shares,
+        "closed_multipliers": controller.closed_multipliers,
+        "starts": len(motion.captured),
+        "mesh_periods": motion.inputs.shape[1],
+        "captured": captured,
+        "captured_share": captured / len(motion.captured),
+        "captured_low": low,
+        "captured_high": high,
+        "capture_median": float(np.median(times)) if times.size else None,
+        "capture_95_percent": float(np.percentile(times, 95)) if times.size else None,
+        "largest_effort": float(share.max()),
+        "mean_effort": float(share.mean()),
+        "final_effort": float(share[motion.captured, -1].max()) if captured else None,
+        "before": trial.before,
+        "after": trial.after,
+    }

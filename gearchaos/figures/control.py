@@ -1,0 +1,130 @@
+"""A page about a controller: section and input over time, capture times, and phase portraits."""
+
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gearchaos.arrays import Floats
+from gearchaos.figures.page import Page, letter, page, remark
+from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, GREY, LEGEND, ORANGE, VERMILION
+from gearchaos.records.control import ControlledMotion
+
+SHOWN_STARTS = 4
+"""Number of starts whose section and input are drawn."""
+
+COLOURS = (BLACK, BLUE, ORANGE, VERMILION)
+
+
+class ControlDrawing(NamedTuple):
+    """What a page about a controller shows.
+
+    Attributes
+    ----------
+    motion : ControlledMotion
+        Motions with control from many starts.
+    load : float
+        The load without control, dimensionless.
+    target : array, shape (mesh periods, states)
+        The section points of the target orbit.
+    free, held : array, shape (samples, states)
+        A motion without control, and one that the controller has captured.
+    symbols : (str, str)
+        Symbols of the first state and of its rate.
+    """
+
+    motion: ControlledMotion
+    load: float
+    target: Floats
+    free: Floats
+    held: Floats
+    symbols: tuple[str, str]
+
+
+def control_page(shown: ControlDrawing) -> Page:
+    """Draw a page about a controller.
+
+    Parameters
+    ----------
+    shown : ControlDrawing
+        What the page shows.
+
+    Returns
+    -------
+    Page
+        Four panels: the section of some starts over time with the target orbit, the input as a
+        share of the load, the distribution of capture times, and the motion in the plane of the
+        first state and its rate, before and after.
+
+    Examples
+    --------
+    >>> from gearchaos.controlling.trial import try_controller
+    >>> figure = control_page(try_controller(controller, 10, 300).drawing())
+    """
+    with page(DOUBLE_COLUMN_MM, 110.0) as figure:
+        panels = figure.subplots(2, 2)
+        draw_section(panels[0, 0], shown)
+        draw_inputs(panels[1, 0], shown)
+        draw_capture_times(panels[0, 1], shown.motion)
+        draw_portraits(panels[1, 1], shown)
+        letter((panels[0, 0], panels[0, 1], panels[1, 0], panels[1, 1]))
+    return figure
+
+
+def draw_section(axes: Axes, shown: ControlDrawing) -> None:
+    """Draw the first state on the section over time, for some starts."""
+    section = shown.motion.section[:SHOWN_STARTS, :, 0]
+    time = np.arange(1, section.shape[1] + 1)
+    for values, colour in zip(section, COLOURS, strict=False):
+        axes.plot(time, values, ".", color=colour, markersize=1.5, markeredgewidth=0.0)
+    for number, point in enumerate(shown.target[:, 0]):
+        label = "target orbit" if number == 0 else None
+        axes.axhline(point, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), label=label)
+    axes.set_xlim(0, shown_periods(shown.motion))
+    axes.set_xlabel("mesh periods with control")
+    axes.set_ylabel(f"section {shown.symbols[0]}")
+    axes.legend(loc="upper right", **{**LEGEND, "frameon": True})
+    remark(axes, f"{len(section)} of {len(shown.motion.section)} starts")
+
+
+def shown_periods(motion: ControlledMotion) -> int:
+    """Return how many mesh periods to show of some starts: until all are captured, and a bit."""
+    whole = int(motion.inputs.shape[1])
+    times = motion.capture_time[:SHOWN_STARTS]
+    if (times < 0).any():
+        return whole
+    return min(whole, int(1.3 * float(times.max())) + 20)
+
+
+def draw_inputs(axes: Axes, shown: ControlDrawing) -> None:
+    """Draw the input as a share of the load over time, for the same starts."""
+    share = 100.0 * shown.motion.inputs[:SHOWN_STARTS] / abs(shown.load)
+    time = np.arange(share.shape[1])
+    for values, colour in zip(share, COLOURS, strict=False):
+        axes.plot(time, values, color=colour, linewidth=0.5, drawstyle="steps-post")
+    axes.set_xlim(0, shown_periods(shown.motion))
+    axes.set_xlabel("mesh periods with control")
+    axes.set_ylabel("change of the load (%)")
+
+
+def draw_capture_times(axes: Axes, motion: ControlledMotion) -> None:
+    """Draw the share of the starts that is captured after some time."""
+    times = np.sort(motion.capture_time[motion.captured])
+    whole = motion.inputs.shape[1]
+    share = 100.0 * np.arange(1, times.size + 1) / len(motion.captured)
+    axes.step([0, *times, whole], [0.0, *share, *share[-1:]] if times.size else [0.0, 0.0],
+              where="post", color=BLUE)  # fmt: skip
+    axes.set_xlim(0, whole)
+    axes.set_ylim(0, 103)
+    axes.set_xlabel("mesh periods with control")
+    axes.set_ylabel("captured starts (%)")
+    remark(axes, f"{times.size} of {len(motion.captured)} captured")
+
+
+def draw_portraits(axes: Axes, shown: ControlDrawing) -> None:
+    """Draw the motion in the plane of the first state and its rate, before and after."""
+    axes.plot(*shown.free[:, :2].T, color=GREY, linewidth=0.25, alpha=0.7, label="without control")
+    axes.plot(*shown.held[:, :2].T, color=VERMILION, linewidth=1.0, label="with control")
+    axes.set_xlabel(shown.symbols[0])
+    axes.set_ylabel(shown.symbols[1])
+    axes.legend(loc="upper right", **{**LEGEND, "frameon": True})

@@ -1,0 +1,401 @@
+"""Feedback control: an input of every lane is chosen anew at the beginning of every mesh period.
+
+The input is added to the steady input of the model, the load of a gear pair, and held constant over
+the period. With a target orbit r and a state x at the beginning of the period::
+
+    u = -K_j (x - r_j)   if this is at most the limit, otherwise 0
+
+j is the point of the orbit that is nearest. Instead of x, a controller may use an estimate z from
+measured states y = C x + noise, which it corrects and predicts once per period::
+
+    z <- z + L_j (y - C z),    then    z <- r_j+1 + A_j (z - r_j) + b_j u
+
+Delayed feedback compares with the state n mesh periods earlier instead of an orbit. A tangent
+vector contains the variation of the input, so that its growth is that of the closed loop.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.memory.block_memory import read_lane, slots_of
+from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
+from gearchaos_kernels.methods.protocol import begin_lane
+from gearchaos_kernels.plan import Floats
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """What the compiled loop contains of a controller.
+
+    Attributes
+    ----------
+    estimated : True or None
+        Whether the controller estimates the state from measured ones.
+    delay : int
+        Mesh periods of a delayed feedback; 0 for a target orbit.
+    states : int
+        Number of states.
+    """
+
+    estimated: Any
+    delay: int
+    states: int
+
+    @property
+    def kept(self) -> int:
+        """Numbers that a controller keeps from one period to the next."""
+        return self.delay * self.states + (self.states if self.estimated else 0)
+
+
+class Control(NamedTuple):
+    """The controller of every lane; states and inputs are in the units of the equations.
+
+    Attributes
+    ----------
+    points : array, shape (lanes, points, states)
+        The target orbit at the beginning of successive mesh periods.
+    gain : array, shape (lanes, points, states)
+        The gains K.
+    scales : array, shape (lanes, states)
+        Scales of the states, by which the nearest point of the orbit is found.
+    limit : array, shape (lanes,)
+        Largest absolute input; a larger one is replaced by 0.
+    begins : int
+        Number of the mesh period in which the control begins.
+    repeats : int
+        Mesh periods after which the excitation repeats. The number of points is a multiple.
+    measured : array of int, shape (signals,)
+        Numbers of the measured states. Without a transition matrix, all states.
+    noise : array, shape (lanes, signals)
+        Standard deviations of the measurement noise.
+    seeds : array of uint64, shape (lanes,)
+        Seeds of the noise.
+    transition : array, shape (lanes, points, states, states) or (lanes, 0, states, states)
+        The matrices A of the estimate; empty if the state itself is used.
+    response : array, shape (lanes, points, states)
+        The vectors b of the estimate.
+    correction : array, shape (lanes, points, states, signals)
+        The matrices L of the estimate.
+    delay : int
+        Mesh periods of a delayed feedback, which takes the first gain; 0 for a target orbit.
+
+    Examples
+    --------
+    A gain of zero for one point of an orbit measures all states and changes nothing:
+
+    >>> point = np.zeros((1, 1, 6))
+    >>> open_loop = Control.of_states(point, point, np.full(1, 0.1))
+    >>> open_loop.flags().kept
+    0
+    """
+
+    points: Floats
+    gain: Floats
+    scales: Floats
+    limit: Floats
+    begins: int
+    repeats: int
+    measured: NDArray[np.intp]
+    noise: Floats
+    seeds: NDArray[np.uint64]
+    transition: Floats
+    response: Floats
+    correction: Floats
+    delay: int = 0
+
+    @classmethod
+    def of_states(cls, points: Floats, gain: Floats, limit: Floats, repeats: int = 1) -> "Control":
+        """Return a controller that knows all states without noise.
+
+        Parameters
+        ----------
+        points, gain : array, shape (lanes, points, states)
+            Target orbit and gains.
+        limit : array, shape (lanes,)
+            Largest absolute input.
+        repeats : int
+            Mesh periods after which the excitation repeats.
+
+        Returns
+        -------
+        Control
+            The controller, which begins at once.
+
+        Examples
+        --------
+        >>> point = np.zeros((2, 1, 6))
+        >>> Control.of_states(point, point, np.ones(2)).noise.shape
+        (2, 6)
+        """
+        lanes, _, states = points.shape
+        return cls(
+            np.ascontiguousarray(points, dtype=np.float64),
+            np.ascontiguousarray(gain, dtype=np.float64),
+            np.ones((lanes, states)),
+            np.ascontiguousarray(limit, dtype=np.float64),
+            0,
+            repeats,
+            np.arange(states),
+            np.zeros((lanes, states)),
+            np.zeros(lanes, dtype=np.uint64),
+            np.zeros((lanes, 0, states, states)),
+            np.zeros((lanes, 0, states)),
+            np.zeros((lanes, 0, states, states)),
+        )
+
+    def flags(self) -> Feedback:
+        """Return what the compiled loop contains of the controller.
+
+        Returns
+        -------
+        Feedback
+            The flags.
+
+        Examples
+        --------
+        >>> point = np.zeros((1, 1, 6))
+        >>> Control.of_states(point, point, np.ones(1)).flags().estimated is None
+        True
+        """
+        estimated = True if self.transition.shape[1] else None
+        return Feedback(estimated, self.delay, self.points.shape[2])
+
+
+class Actuation(NamedTuple):
+    """The controllers of a batch and how their inputs act on lanes, as blocks read them.
+
+    Attributes
+    ----------
+    points, gain, scales, limit, measured, noise, seeds, transition, response, correction : array
+        See `Control`.
+    strength : array, shape (lanes,)
+        Change of the steady input of a lane, per step squared, by an input of 1.
+    inputs : array, shape (lanes, periods)
+        The input of every mesh period, written by the blocks.
+    about : array of int, shape (4,)
+        Place of the steady input among the coefficients of a lane, mesh periods before the first
+        one, the mesh period in which the control begins, and `Control.repeats`.
+    """
+
+    points: Floats
+    gain: Floats
+    scales: Floats
+    limit: Floats
+    measured: NDArray[np.intp]
+    noise: Floats
+    seeds: NDArray[np.uint64]
+    transition: Floats
+    response: Floats
+    correction: Floats
+    strength: Floats
+    inputs: Floats
+    about: NDArray[np.intp]
+
+
+@scalar
+def act(memory, block, period, batch, control, given, scene):
+    """Choose the input of all lanes of a block for a mesh period, and its variation.
+
+    ``control``: the `Actuation`.
+    """
+    column, before, begins = control.about[0], control.about[1], control.about[2]
+    phase = before + period
+    for slot in range(slots_of(block.lanes)):
+        index = batch.order[block.first + min(slot, block.lanes - 1)]
+        scale = batch.scales[index]
+        if period == 0:
+            prepare(memory, slot, control.points[index], scale, scene)
+        measure(memory, slot, index, phase, control, scale, scene)
+        nearest = nearest_point(memory, slot, phase, control, index, scale, scene)
+        found = chosen_input(memory, slot, index, nearest, control, scale, scene)
+        used = period >= begins and abs(found) <= control.limit[index]
+        effort = found if used else 0.0
+        varied = 0.0
+        if scene.tangent is not None:
+            if used:
+                varied = varied_input(memory, slot, index, nearest, control, scale, scene)
+        predict(memory, slot, index, nearest, effort, varied, control, scale, scene)
+        strength = control.strength[index]
+        coefficient = batch.coefficients[index, column] + strength * effort
+        memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
+        memory[control_rows(scene).varied * STRIDE + slot] = strength * varied
+        begin_lane(memory, slot, read_lane(memory, slot, scene), given, scene)
+        if slot < block.lanes:
+            control.inputs[index, period] = effort
+
+
+@scalar
+def state_at(memory, slot, state, scale):
+    """Return one state of a lane in the units of the equations."""
+    return memory[(STATE + state) * STRIDE + slot] * scale[state]
+
+
+@scalar
+def prepare(memory, slot, points, scale, scene):
+    """Begin the estimate at the first point of the orbit, and the delay at the first state."""
+    first = control_rows(scene).kept
+    for state in range(scale.shape[0]):
+        if scene.feedback.estimated is not None:
+            memory[(first + state) * STRIDE + slot] = points[0, state]
+            memory[(control_rows(scene).kept_varied + state) * STRIDE + slot] = 0.0
+        for earlier in range(control_rows(scene).delay):
+            row = first + earlier * scale.shape[0] + state
+            memory[row * STRIDE + slot] = state_at(memory, slot, state, scale)
+            varied = control_rows(scene).kept_varied + earlier * scale.shape[0] + state
+            memory[varied * STRIDE + slot] = 0.0
+
+
+@scalar
+def measure(memory, slot, index, phase, control, scale, scene):
+    """Store what the controller knows of the state, and the same of the tangent vector."""
+    known, kept = control_rows(scene).known, control_rows(scene).kept
+    known_varied, kept_varied = control_rows(scene).known_varied, control_rows(scene).kept_varied
+    tangent = rows(scene).tangent
+    states = scale.shape[0]
+    for state in range(states):
+        if scene.feedback.estimated is None:
+            value = state_at(memory, slot, state, scale)
+            noise = control.noise[index, state]
+            if noise > 0.0:
+                value += noise * gaussian(control.seeds[index], phase * states + state)
+            memory[(known + state) * STRIDE + slot] = value
+            varied = 0.0
+            if scene.tangent is not None:
+                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
+            memory[(known_varied + state) * STRIDE + slot] = varied
+        else:
+            memory[(known + state) * STRIDE + slot] = memory[(kept + state) * STRIDE + slot]
+            varied = memory[(kept_varied + state) * STRIDE + slot]
+            memory[(known_varied + state) * STRIDE + slot] = varied
+    if scene.feedback.estimated is not None:
+        place = nearest_point(memory, slot, phase, control, index, scale, scene)
+        signals = control.measured.shape[0]
+        for signal in range(signals):
+            state = control.measured[signal]
+            value = state_at(memory, slot, state, scale)
+            value += control.noise[index, signal] * gaussian(
+                control.seeds[index], phase * signals + signal
+            )
+            error = value - memory[(kept + state) * STRIDE + slot]
+            varied = 0.0
+            if scene.tangent is not None:
+                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
+                varied -= memory[(kept_varied + state) * STRIDE + slot]
+            for row in range(states):
+                factor = control.correction[index, place, row, signal]
+                memory[(known + row) * STRIDE + slot] += factor * error
+                memory[(known_varied + row) * STRIDE + slot] += factor * varied
+
+
+@scalar
+def nearest_point(memory, slot, phase, control, index, scale, scene):
+    """Return the number of the orbit's point that is nearest to what is known of the state.
+
+    Only points at the same phase of the excitation are compared.
+    """
+    points, repeats = control.points.shape[1], control.about[3]
+    known = control_rows(scene).known
+    nearest = phase % repeats
+    least = math.inf
+    for point in range(phase % repeats, points, repeats):
+        distance = 0.0
+        for state in range(scale.shape[0]):
+            value = memory[(known + state) * STRIDE + slot] - control.points[index, point, state]
+            distance += (value / control.scales[index, state]) ** 2
+        if distance < least:
+            nearest, least = point, distance
+    return nearest
+
+
+@scalar
+def chosen_input(memory, slot, index, nearest, control, scale, scene):
+    """Return the input that the gains demand, -K times the deviation."""
+    known, kept = control_rows(scene).known, control_rows(scene).kept
+    delay, states = control_rows(scene).delay, scale.shape[0]
+    total = 0.0
+    for state in range(states):
+        reference = control.points[index, nearest, state]
+        if delay > 0:
+            reference = memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
+        deviation = memory[(known + state) * STRIDE + slot] - reference
+        total -= control.gain[index, nearest, state] * deviation
+    return total
+
+
+@scalar
+def varied_input(memory, slot, index, nearest, control, scale, scene):
+    """Return the variation of the input along the tangent vector."""
+    known, kept = control_rows(scene).known_varied, control_rows(scene).kept_varied
+    delay, states = control_rows(scene).delay, scale.shape[0]
+    total = 0.0
+    for state in range(states):
+        deviation = memory[(known + state) * STRIDE + slot]
+        if delay > 0:
+            deviation -= memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
+        total -= control.gain[index, nearest, state] * deviation
+    return total
+
+
+@scalar
+def predict(memory, slot, index, nearest, effort, varied, control, scale, scene):
+    """Keep what the next period needs: the predicted estimate, or the states of the delay."""
+    at, states = control_rows(scene), scale.shape[0]
+    for earlier in range(at.delay - 1, -1, -1):
+        for state in range(states):
+            row = earlier * states + state
+            source = at.known + state if earlier == 0 else at.kept + row - states
+            memory[(at.kept + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+            source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
+            memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+    if scene.feedback.estimated is not None:
+        following = (nearest + 1) % control.points.shape[1]
+        for row in range(states):
+            value = control.points[index, following, row]
+            value += control.response[index, nearest, row] * effort
+            change = control.response[index, nearest, row] * varied
+            for state in range(states):
+                factor = control.transition[index, nearest, row, state]
+                deviation = memory[(at.known + state) * STRIDE + slot]
+                value += factor * (deviation - control.points[index, nearest, state])
+                change += factor * memory[(at.known_varied + state) * STRIDE + slot]
+            memory[(at.kept + row) * STRIDE + slot] = value
+            memory[(at.kept_varied + row) * STRIDE + slot] = change
+
+
+@scalar
+def scale_variations(memory, slot, length, scene):
+    """Divide all variations of the controller by the length of the tangent vector."""
+    at = control_rows(scene)
+    memory[at.varied * STRIDE + slot] /= length
+    for row in range(at.kept_varied, at.end):
+        memory[row * STRIDE + slot] /= length
+
+
+@scalar
+def gaussian(seed, number):
+    """Return a normally distributed number that depends on a seed and a counter only.
+
+    Two outputs of SplitMix64 (Steele, Lea, Flood 2014) make one number (Box and Muller 1958).
+    """
+    first = uniform(mixed(seed + np.uint64(2 * number + 1) * np.uint64(0x9E3779B97F4A7C15)))
+    second = uniform(mixed(seed + np.uint64(2 * number + 2) * np.uint64(0x9E3779B97F4A7C15)))
+    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+
+
+@scalar
+def mixed(number):
+    """Return the output function of SplitMix64."""
+    number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return number ^ (number >> np.uint64(31))
+
+
+@scalar
+def uniform(number):
+    """Return a number above 0 and at most 1 from 64 bits."""
+    return (float(number >> np.uint64(11)) + 1.0) * 2.0**-53

@@ -1,0 +1,202 @@
+"""Control of periodic orbits: its linear design, what it captures, and the command."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.stats
+from gearchaos_kernels import Plan, integrate
+
+import gearchaos
+from gearchaos.controlling.controller import Controller, ControlSettings
+from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controllable
+from gearchaos.errors import ConfigurationError
+
+from .commands import run_module
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+PUBLISHED = {0.05: (0.915, 347), 0.1: (1.0, 164), 0.2: (1.0, 144), 0.3: (1.0, 140)}
+"""Share of 1000 chaotic starts that each limit captured in an independent computation, and the
+median time in mesh periods."""
+
+
+@cache
+def chaotic():
+    """Return the pair of Pan 2021 in chaos, and its unstable orbit of period 1."""
+    config = gearchaos.load_config(SWEEPS / "pan2021.toml")
+    config = config.replace("integration.method", "flow_map")
+    config = config.replace("integration.steps_per_period", 12)
+    system = gearchaos.System(config, pitch_error=12.47)
+    return system, system.orbits(1, record=3000)[0]
+
+
+@cache
+def controller(**settings):
+    """Return a controller of this orbit."""
+    return Controller(*chaotic(), ControlSettings(**settings))
+
+
+def test_the_open_loop_is_the_known_one_and_the_gain_that_of_the_riccati_equation():
+    found = controller()
+    assert found.multipliers[0] == pytest.approx(-1.6976, abs=1e-4)
+    moduli = np.abs(found.closed_multipliers)
+    np.testing.assert_allclose(moduli, [0.92, 0.92, 0.31, 0.31, 0.24, 0.24], atol=0.005)
+    (a,), (b,) = found.maps.jacobians, found.maps.responses
+    cost = scipy.linalg.solve_discrete_are(a, b[:, np.newaxis], np.eye(6), [[10.0]])
+    np.testing.assert_allclose(found.gain[0], b @ cost @ a / (10.0 + b @ cost @ b), rtol=1e-9)
+
+
+def test_the_response_is_the_difference_by_the_load():
+    system, orbit = chaotic()
+    (response,) = controller().maps.responses
+    h = 1e-6
+    one = system.equations
+    ends = [
+        integrate(
+            one.with_steady_input(one.steady_input + sign * h),
+            orbit.point[np.newaxis],
+            Plan(12, 0, 1, 1, method="flow_map"),
+        ).end_state[0]
+        for sign in (1.0, -1.0)
+    ]
+    np.testing.assert_allclose(response, (ends[0] - ends[1]) / (2.0 * h), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["lqr", "placement"])
+def test_the_frame_of_the_closed_loop_has_the_designed_multipliers(method):
+    found = controller(method=method)
+    plan = Plan(12, 0, 1, 1, tangent=True, method="flow_map")
+    system, point = found.system.equations.of(np.zeros(6, dtype=int)), found.orbit.point
+    outcome = integrate(
+        system, np.tile(point, (6, 1)), plan, tangent_start=np.eye(6), control=found.control(6)
+    )
+    frame = (outcome.end_tangent * np.exp(outcome.growth)).T
+    expected = np.sort_complex(found.closed_multipliers)
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(frame)), expected, atol=1e-8)
+
+
+def test_placement_leaves_stable_multipliers_and_removes_unstable_ones():
+    found = controller(method="placement")
+    stable = found.multipliers[np.abs(found.multipliers) < 1.0]
+    kept = found.closed_multipliers[:-1]
+    np.testing.assert_allclose(np.sort_complex(kept), np.sort_complex(stable), atol=1e-8)
+    assert abs(found.closed_multipliers[-1]) < 1e-8
+    rng = np.random.default_rng(1)
+    two_unstable = np.diag([1.4, -2.2, 0.5])[np.newaxis]
+    maps = PeriodMaps(np.zeros((1, 3)), two_unstable, rng.normal(size=(1, 3)))
+    moduli = np.sort(np.abs(np.linalg.eigvals(maps.closed(placed_gain(maps)))))
+    np.testing.assert_allclose(moduli, [0.0, 0.0, 0.5], atol=1e-7)
+
+
+def test_the_cost_of_a_small_deviation_is_that_of_the_riccati_equation():
+    found = controller()
+    (a,), (b,) = found.maps.jacobians, found.maps.responses
+    cost = scipy.linalg.solve_discrete_are(a, b[:, np.newaxis], np.eye(6), [[10.0]])
+    deviation = 1e-7 * np.array([1.0, -0.5, 0.3, 0.2, -0.1, 0.4])
+    motion = found.run(found.orbit.point[np.newaxis] + deviation, 200)
+    states = motion.section[0] - found.orbit.point
+    paid = np.sum(states**2) + np.sum(deviation**2) + 10.0 * np.sum(motion.inputs**2)
+    assert paid == pytest.approx(deviation @ cost @ deviation, rel=1e-4)
+
+
+@pytest.mark.parametrize("limit", PUBLISHED)
+def test_chaotic_starts_are_captured_as_often_and_as_fast_as_known(limit):
+    found = controller(limit=limit)
+    # Captured there is a motion whose states are all within 1e-6 of the orbit.
+    motion = found.run(1000, 1000)._replace(within=1e-6 / found.scales.max())
+    share, median = PUBLISHED[limit]
+    counts = np.array([[motion.captured.sum(), 1000 * share], [0, 0]], dtype=int)
+    counts[1] = 1000 - counts[0]
+    assert scipy.stats.fisher_exact(counts).pvalue > 0.003
+    times = np.sort(motion.capture_time[motion.captured])
+    # Both medians vary: 95 % of medians lie between the order statistics n/2 -+ sqrt(n).
+    reach = int(1.5 * np.sqrt(2.0 * times.size))
+    middle = times.size // 2
+    assert times[middle - reach] <= median <= times[middle + reach]
+    assert np.abs(motion.inputs).max() <= limit * controller().load
+    assert np.abs(motion.inputs[motion.captured, -1]).max() < 1e-5 * controller().load
+
+
+def test_noise_spreads_the_state_as_the_lyapunov_equation_says():
+    found = controller(noise=1e-7)
+    lanes = 2000
+    starts = np.tile(found.orbit.point, (lanes, 1))
+    motion = found.run(starts, 150)
+    (a,), (b,) = found.maps.jacobians, found.maps.responses
+    measured = np.diag((1e-7 * found.scales) ** 2)
+    acting = np.outer(b, found.gain[0])
+    spread = scipy.linalg.solve_discrete_lyapunov(a - acting, acting @ measured @ acting.T)
+    found_spread = np.var(motion.section[:, -1] - found.orbit.point, axis=0)
+    error = 3.0 * np.sqrt(2.0 / lanes)
+    np.testing.assert_allclose(found_spread, np.diag(spread), rtol=error)
+    again = found.run(starts, 150)
+    assert np.array_equal(again.section, motion.section)
+    other = controller(noise=1e-7, seed=1).run(starts, 150)
+    assert not np.array_equal(other.section, motion.section)
+
+
+def test_two_measured_states_are_enough_near_the_orbit():
+    found = controller(measured=("delta_5", "delta_5_rate"), noise=1e-8)
+    near = found.orbit.point + 1e-6 * np.random.default_rng(2).normal(size=(20, 6))
+    motion = found.run(near, 400)
+    assert motion.distance[:, -1].max() < 1e-5
+    free = integrate(
+        found.system.equations.of(np.zeros(20, dtype=int)),
+        near,
+        Plan(12, 0, 400, 400, method="flow_map"),
+    )
+    assert np.abs(free.section[:, -1] - found.orbit.point).max() > 0.1
+
+
+def test_the_closed_loop_exponent_is_that_of_the_largest_closed_multiplier():
+    found = controller()
+    plan = Plan(12, 300, 200, 1, tangent=True, method="flow_map")
+    outcome = found.integrate(np.tile(found.orbit.point, (2, 1)), plan)
+    largest = np.log(np.abs(found.closed_multipliers[0]))
+    assert outcome.growth.mean() == pytest.approx(largest, abs=5e-3)
+
+
+def test_modes_without_input_are_named():
+    maps = PeriodMaps(np.zeros((1, 2)), np.diag([1.5, 0.5])[np.newaxis], np.array([[0.0, 1.0]]))
+    with pytest.raises(ConfigurationError, match=r"does not act .* multipliers 1\.5"):
+        require_controllable(maps, "pair.toml")
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"limit": 0.0}, "limit: is 0, and must be positive"),
+        ({"noise": -1.0}, "noise: is -1"),
+        ({"method": "pid"}, "must be one of 'lqr', 'placement', 'delayed'"),
+        ({"measured": ("delta_9",)}, "measured = 'delta_9'"),
+    ],
+)
+def test_settings_out_of_their_range_are_refused(settings, words):
+    with pytest.raises(ConfigurationError, match=words):
+        Controller(*chaotic(), ControlSettings(**settings))
+
+
+def test_the_command_prints_a_table_and_json_and_draws(tmp_path):
+    text = (SWEEPS / "pan2021.toml").read_text()
+    (tmp_path / "pair.toml").write_text(text.replace("rk4", "flow_map"))
+    options = ("pair.toml", "--at", "12.47", "--starts", "30", "--periods", "600")
+    done = run_module("gearchaos.control", *options, "-o", "pair.png", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "captured: 30 of 30 starts, 100.0 % (88.6 % to 100.0 %)" in done.out
+    assert (tmp_path / "pair.png").stat().st_size > 10_000
+    done = run_module("gearchaos.control", *options, "--json", cwd=tmp_path)
+    facts = json.loads(done.out)
+    assert facts["multipliers"][0][0] == pytest.approx(-1.6976, abs=1e-4)
+    assert facts["after"]["load_factor_largest"] < facts["before"]["load_factor_largest"]
+
+
+def test_the_command_names_an_orbit_that_is_not_there(tmp_path):
+    done = run_module(
+        "gearchaos.control", str(SWEEPS / "pan2021.toml"), "--at", "5", "--orbit", "7", cwd=tmp_path
+    )
+    assert done.code == 2
+    assert "--orbit 7 is not among them" in done.err
+    assert "Traceback" not in done.err
