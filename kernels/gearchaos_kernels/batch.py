@@ -51,6 +51,7 @@ def scene_of(system: LaneSystem, plan: Plan) -> Scene:
         tangent=flag(plan.tangent),
         before=flag(resolved or any(one.reads_before for one in wanted)),
         switches=flag(switches),
+        traced=flag(method.traces and plan.loads and not plan.records_steps),
         jumps=flag(resolved and any(kind.damped_in_contact for kind in model.kinds_of(flags))),
     )
 

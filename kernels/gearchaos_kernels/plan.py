@@ -74,8 +74,8 @@ class Plan(NamedTuple):
 
     @property
     def records_steps(self) -> bool:
-        """Whether recorders read every step; flow maps then take shorter steps."""
-        return bool(self.loads or self.states or self.orders)
+        """Whether recorders read the end of every step; flow maps then take shorter steps."""
+        return bool(self.states or self.orders)
 
     @property
     def more_rows(self) -> int:

@@ -42,6 +42,8 @@ class Scene:
         Whether the equations of a lane switch at known moments of the mesh period.
     jumps : True or None
         Whether the force of some element jumps where a contact begins or ends.
+    traced : True or None
+        Whether the method follows forces and observed signals along every step.
     """
 
     model: Any
@@ -53,6 +55,7 @@ class Scene:
     before: Any
     switches: Any = None
     jumps: Any = None
+    traced: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""

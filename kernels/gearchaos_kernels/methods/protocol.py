@@ -58,6 +58,9 @@ class Method:
         Frozen dataclass without fields that identifies the method in a scene.
     always_resolved : bool
         Whether the method resolves every crossing, also where the plan has plain steps.
+    traces : bool
+        Whether the method follows forces and observed signals along every step by itself, and
+        accumulates them in the rows `recorders.loads.accumulated_of`.
     rows : callable
         ``rows(scene)``: rows of a block that the method uses for itself.
     prepare : callable
@@ -99,6 +102,7 @@ class Method:
     name: str
     flags: Any
     always_resolved: bool
+    traces: bool
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]

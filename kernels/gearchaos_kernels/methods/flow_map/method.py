@@ -27,6 +27,7 @@ from gearchaos_kernels.methods.flow_map.store import (
     sharing,
     work,
 )
+from gearchaos_kernels.methods.flow_map.tracing import trace_block
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.models.interfaces import grid_within
 from gearchaos_kernels.plan import Plan
@@ -80,7 +81,11 @@ def step(memory, lanes, at, given, scene):
     """Take one step in every slot; return how many lanes may have left a contact branch."""
     # A single lane is faster along its state.
     slots = 1 if lanes == 1 else slots_of(lanes)
-    return move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
+    suspects = move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
+    if scene.traced is not None:
+        if at.recorded:
+            trace_block(memory, slots, given.maps, at.maps_at, scene)
+    return suspects
 
 
 @scalar
@@ -97,6 +102,7 @@ FLOW_MAP = Method(
     name="flow_map",
     flags=FlowMap,
     always_resolved=True,
+    traces=True,
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,

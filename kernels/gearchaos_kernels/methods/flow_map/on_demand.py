@@ -24,6 +24,7 @@ from gearchaos_kernels.methods.flow_map.store import (
     fewest_steps,
     make_tables,
     sharing,
+    which_maps,
 )
 from gearchaos_kernels.methods.protocol import Integers, Share, cut
 from gearchaos_kernels.plan import MAP_BYTES, Floats, Plan
@@ -228,7 +229,8 @@ def _sets_of(
     global _kept
     scene, place = scene.bare(), layout_of(scene)
     rows = system.of([group.lanes[0] for group in groups]).map_parameters()
-    scene_name = type(scene.model), scene.model, scene.resolved, steps, system.map_constants()
+    model = type(scene.model), scene.model
+    scene_name = *model, *which_maps(scene), steps, system.map_constants()
     names = [(scene_name, row.tobytes(), g.steps) for row, g in zip(rows, groups, strict=True)]
     needed = [(name, g, number) for name, g in zip(names, groups, strict=True) for number in g.sets]
     new = [one for one in needed if one[2] not in _kept.places.get(one[0], {})]

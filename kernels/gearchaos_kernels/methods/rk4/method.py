@@ -141,6 +141,7 @@ RK4 = Method(
     name="rk4",
     flags=Rk4,
     always_resolved=False,
+    traces=False,
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,
