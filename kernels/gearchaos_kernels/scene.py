@@ -109,6 +109,12 @@ def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
         for name, value in vars(part).items():
             if not (value is None or value is True or is_dataclass(value)):
                 raise TypeError(f"{type(part).__qualname__}.{name}: is {value!r}, not True or None")
+    return _scene_type(scene)
+
+
+@cache
+def _scene_type(scene: Scene) -> SceneType:
+    """Return the Numba type of a scene, always the same one."""
     return SceneType(scene)
 
 

@@ -270,6 +270,37 @@ def test_maps_made_on_demand_give_the_same_bits_on_any_threads(crowd, monkeypatc
         numba.set_num_threads(before)
 
 
+def test_maps_made_on_demand_serve_lanes_with_their_own_periods(crowd):
+    system, start, plan, _ = crowd
+    own = np.resize([1, 3, 2, 3, 1], system.lanes)
+    together = integrate(system, start, plan, periods=own)
+    for periods in (1, 2, 3):
+        chosen = np.flatnonzero(own == periods)
+        shorter = plan._replace(recorded_periods=periods, section_points=periods)
+        separate = integrate(system.of(chosen), start[chosen], shorter)
+        found = lanes_out_of(together, chosen)
+        section, growth = found.section[:, -periods:].copy(), found.growth[:, :periods].copy()
+        assert_same_bits(found._replace(section=section, growth=growth), separate)
+
+
+@pytest.mark.parametrize("map_bytes", [0, 2**27])
+def test_maps_made_on_demand_carry_frames(crowd, monkeypatch, map_bytes):
+    system, start, plan, _ = crowd
+    chosen, states = [0, 1, 2, 3, 4, 6, 7], 10
+    lanes, starts = system.of(chosen).repeated(states), np.repeat(start[chosen], states, axis=0)
+    vectors = np.tile(np.eye(states), (len(chosen), 1))
+    monkeypatch.setattr(on_demand, "_kept", on_demand._Kept(0))
+    framed = plan._replace(frame=True, map_bytes=map_bytes)
+    found = integrate(lanes, starts, framed, tangent_start=vectors)
+    growth = found.growth.reshape(len(chosen), states, PERIODS)
+    single = integrate(lanes, starts, plan, tangent_start=vectors)
+    assert np.array_equal(found.section, single.section)
+    assert growth[:, 0] == pytest.approx(single.growth[::states], abs=1e-12)
+    columns = single.end_tangent * np.exp(single.growth.sum(axis=1))[:, np.newaxis]
+    volume = np.linalg.slogdet(columns.reshape(-1, states, states)).logabsdet
+    assert growth.sum(axis=(1, 2)) == pytest.approx(volume, abs=1e-9)
+
+
 def test_maps_that_no_steps_suffice_for_stop_their_lanes_only(crowd):
     system, start, plan, whole = crowd
     wild = system.of(np.arange(4))
