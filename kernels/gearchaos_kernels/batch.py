@@ -92,14 +92,12 @@ def integrate(
     Returns
     -------
     Outcome
-        It is identical bit for bit for any number of threads and any split or order of the lanes.
+        Identical bit for bit for any number of threads and any split or order of the lanes.
 
     Raises
     ------
     ValueError
-        If the method cannot integrate the system, see `LaneSystem.refuses_maps`, if the model has
-        no signal for amplitudes, if a frame has more than 32 states, or if the system is beyond
-        what the model supports.
+        If method, model or kernels do not support the request, see `LaneSystem.refuses_maps`.
 
     Examples
     --------
@@ -109,17 +107,19 @@ def integrate(
         exponents = outcome.growth.mean(axis=1) / pairs.mesh_period
     """
     lanes, states = start.shape[0], len(system.states)
-    if tangent_start is None:
-        tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
     scene = scene_of(system, plan)
-    _require_supported(scene, plan, states)
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
     recorded = _recorded_periods(plan, periods, outcome)
-    for share in METHODS[plan.method].prepare(system, plan, scene, recorded):
+    for prepared in METHODS[plan.method].prepare(system, plan, scene, recorded):
+        share = with_periods(prepared, recorded, plan.lanes_together(states))
         steps_taken[share.order] = share.steps[share.order]
-        share = with_periods(share, recorded, plan.lanes_together(states))
         _integrate_share(system, share, (start, tangent_start), plan, outcome, scene)
     return _per_tau(system, plan, outcome, steps_taken, recorded, scene)
+
+
+def _tangents(shape: tuple[int, ...], given: Floats | None) -> Floats:
+    """Return tangent vectors at tau = 0, (lanes, states)."""
+    return np.full(shape, 1.0 / np.sqrt(shape[1])) if given is None else given
 
 
 def _recorded_periods(
@@ -145,16 +145,18 @@ def _require_supported(scene: Scene, plan: Plan, states: int) -> None:
 def _integrate_share(
     system: LaneSystem,
     share: Share,
-    starts: tuple[Floats, Floats],
+    starts: tuple[Floats, Floats | None],
     plan: Plan,
     outcome: Outcome,
     scene: Scene,
 ) -> None:
     """Integrate some lanes and write what is recorded of them into an outcome.
 
-    ``starts``: states and tangent vectors at tau = 0, both of shape (lanes, states).
+    ``starts``: states and tangent vectors at tau = 0, both of shape (lanes, states); None for
+    tangent vectors of equal components.
     """
-    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in starts)
+    given = starts[0], _tangents(starts[0].shape, starts[1])
+    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in given)
     chosen = np.array([*_columns(system, plan), _observed_row(scene)], dtype=np.intp)
     orders = np.array([float(order) for order in plan.orders])
     step = system.mesh_period / share.steps
@@ -206,7 +208,11 @@ def _columns(system: LaneSystem, plan: Plan) -> list[int]:
 
 
 def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
-    """Return an outcome whose arrays have the shapes of what is recorded."""
+    """Return an outcome whose arrays have the shapes of what is recorded.
+
+    Raises ValueError if the model or the kernels do not support that.
+    """
+    _require_supported(scene, plan, states)
     elements = provider_of(scene.model).elements(scene.model)
     kept, loads = plan.history_periods, scene.recorders.loads
     in_contact = elements if scene.recorders.contact else 0
