@@ -111,7 +111,7 @@ def _stretches(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
 
 
 def _stretches_by_period(system: LaneSystem, state: Floats, frame: Floats, plan: Plan) -> Floats:
-    """Return what `_stretches` returns; the kernels have no frames of so many states."""
+    """Return what `_stretches` returns; the kernels have no frames of more than 32 states."""
     lanes, states = state.shape
     logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
     for period in range(-plan.transient_periods, plan.recorded_periods):

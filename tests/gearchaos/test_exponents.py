@@ -75,7 +75,7 @@ def test_sum_of_all_exponents_is_the_trace_whether_periodic_or_chaotic(scene, st
 def test_frames_of_the_kernels_are_those_of_a_decomposition_after_every_period(monkeypatch):
     groups = pan2021(PERIODIC_AND_CHAOTIC)
     found = exponents_of(NO_AXIAL, groups, 200, 8, 4)
-    # As for systems of so many states that the kernels have no frames of them.
+    # As for systems with more states than a block has lanes.
     monkeypatch.setattr("gearchaos.dynamics.exponents.LANES", 1)
     assert found.values == pytest.approx(
         exponents_of(NO_AXIAL, groups, 200, 8, 4).values, abs=1e-12

@@ -17,7 +17,7 @@ ENOUGH = 0.1
 """Share of a vector that must remain for one pass to make it orthogonal to rounding."""
 
 MOST_PASSES = 3
-"""Largest number of passes; a third one serves vectors of which only rounding errors remain."""
+"""Largest number of passes; a third one serves vectors that consist of rounding errors."""
 
 
 @part
@@ -72,7 +72,7 @@ def orthogonalise(memory, begin, number, scale, scene):
 
 @scalar
 def replace_direction(memory, begin, number, scale, scene):
-    """Replace a vector of which rounding errors remained by one that is orthogonal to those before.
+    """Replace a vector that consists of rounding errors by one orthogonal to those before.
 
     Of the axes, one at least has a share of 1 / states that is orthogonal to fewer vectors.
     """
