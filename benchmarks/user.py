@@ -2,15 +2,18 @@
 
     python benchmarks/user.py [--rounds 3] [--python OTHER] [--rows carried ...] [--cold]
 
-Every row is a command as a user types it, in a process of its own with one thread. The times are
-processor times, medians over rounds. With --python the commands also run in another environment,
-such as one with an earlier version, in turn with this one; the last column is then the median of
-the ratios of the other version to this one.
+Every row is a command as a user types it, in a process of its own with one thread, or with two if
+its name says so. The times are processor times in seconds but for the column "clock", which is the
+time that passes; "memory" is the largest memory of the process in MB. All are medians over rounds.
+Rows whose names begin with "first" compile in an empty cache. With --python the commands also run
+in another environment, such as one with an earlier version, in turn with this one; the last column
+is then the median of the ratios of the other version to this one.
 """
 
 import argparse
 import json
 import os
+import resource
 import runpy
 import statistics
 import subprocess
@@ -30,7 +33,13 @@ TIMES = "transient_periods=500,recorded_periods=500"
 CARRIED = "start.carry='both'", "sweep.count=300"
 SHORT = "sweep.count=100000", "outputs.section_points=10", "outputs.motion=false"
 SHORT_TIMES = "transient_periods=10,recorded_periods=10"
-EXPONENTS = "outputs.exponents=true", "sweep.count=151"
+EXPONENTS = "outputs.exponents=true", "outputs.motion=false", "sweep.count=151"
+TANGENTS = "outputs.motion=false", "sweep.count=906"
+FEW = "outputs.motion=false", "integration={steps_per_period=200,recorded_periods=20000}"
+MANY = "outputs.motion=false", "outputs.lyapunov=false"
+MILLION = *MANY, "sweep.count=1000000", "outputs.section_points=1"
+POINTS = *MANY, "sweep.count=100000", "outputs.section_points=100"
+FEWEST_TIMES = "integration={method='flow_map',transient_periods=1,recorded_periods=100}"
 
 ROWS: dict[str, tuple[str, tuple[str, ...]]] = {
     "pan2021, rk4": (PAN, ()),
@@ -44,14 +53,28 @@ ROWS: dict[str, tuple[str, tuple[str, ...]]] = {
     "loads, flow maps": (PAN, (MAPS, "outputs.loads=true")),
     "exponents, rk4": (PAN, EXPONENTS),
     "exponents, flow maps": (PAN, (*EXPONENTS, MAPS)),
+    "their tangents, rk4": (PAN, TANGENTS),
+    "their tangents, flow maps": (PAN, (*TANGENTS, MAPS)),
+    "one lane, rk4": (PAN, (*FEW, "sweep.from=10.0", "sweep.count=1")),
+    "8 lanes, rk4": (PAN, (*FEW, "sweep.count=8")),
     "short, rk4": (PAN, (*SHORT, f"integration={{steps_per_period=200,{SHORT_TIMES}}}")),
     "short, flow maps": (PAN, (*SHORT, MAPS.replace("}", f",{SHORT_TIMES}}}"))),
     "refine, rk4": (PAN, ()),
     "refine, flow maps": (PAN, (MAPS,)),
+    "first flow maps": (PAN, (MAPS, "sweep.count=8")),
+    "pan2021, rk4, 2 threads": (PAN, ()),
+    "pan2021, flow maps, 2 threads": (PAN, (MAPS,)),
+    "million lanes": (PAN, (*MILLION, FEWEST_TIMES.replace("100}", "1}"))),
+    "figure, 1e7 points": (PAN, (*POINTS, FEWEST_TIMES)),
 }
-"""Configuration and settings of every row; a row "refine" is `stages --refine` of its result."""
+"""Configuration and settings of every row.
 
-PARTS = ("start-up", "compilation", "kernel", "labels", "files")
+A row "refine" is `stages --refine` of its result, a row "figure" is `plot` of it.
+"""
+
+LONGER = "longer records"
+PARTS = ("start-up", "compilation", "kernel", LONGER, "labels", "files")
+OTHERS = ("clock", "memory")
 
 
 def main() -> None:
@@ -65,7 +88,8 @@ def main() -> None:
     from machine import machine_facts, print_machine
 
     print_machine()
-    print(f"{'row':22}{'total':>8}" + "".join(f"{part:>13}" for part in PARTS) + f"{'ratio':>8}")
+    heads = "".join(f"{part:>15}" for part in PARTS) + "".join(f"{one:>8}" for one in OTHERS)
+    print(f"{'row':30}{'total':>8}{heads}{'ratio':>8}")
     pythons = [sys.executable, *filter(None, [options.python])]
     rows = []
     for name in ROWS:
@@ -86,8 +110,10 @@ def main() -> None:
 
 def line(name: str, found: list[list[dict[str, float]]]) -> str:
     """Return the line of a row; ``found``: its times by round and interpreter."""
-    own = {part: statistics.median(one[0][part] for one in found) for part in ("total", *PARTS)}
-    text = f"{name:22}{own['total']:8.2f}" + "".join(f"{own[part]:13.2f}" for part in PARTS)
+    names = "total", *PARTS, *OTHERS
+    own = {part: statistics.median(one[0][part] for one in found) for part in names}
+    text = f"{name:30}{own['total']:8.2f}" + "".join(f"{own[part]:15.2f}" for part in PARTS)
+    text += "".join(f"{own[part]:8.1f}" for part in OTHERS)
     if len(found[0]) > 1:
         ratio = statistics.median(other["total"] / this["total"] for this, other in found)
         text += f"{ratio:8.2f}"
@@ -100,12 +126,18 @@ def measured(name: str, python: str, cold: bool) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         result = str(Path(folder) / "result.h5")
         sweep = ["sweep", config, "-o", result, *(f"--set={one}" for one in settings)]
-        environment = {**os.environ, "NUMBA_NUM_THREADS": "1"}
-        if cold:
+        threads = "2" if name.endswith("2 threads") else "1"
+        environment = {**os.environ, "NUMBA_NUM_THREADS": threads}
+        # A user's Python keeps its compiled modules.
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        if cold or name.startswith("first"):
             environment["NUMBA_CACHE_DIR"] = folder
         times = timed(python, sweep, environment)
         if name.startswith("refine"):
             times = timed(python, ["stages", result, "--refine", "0.001"], environment)
+        if name.startswith("figure"):
+            figure = str(Path(folder) / "figure.png")
+            times = timed(python, ["plot", result, "-o", figure], environment)
     return times
 
 
@@ -118,8 +150,7 @@ def timed(python: str, command: list[str], environment: dict[str, str]) -> dict[
     )
     if ended.returncode:
         raise SystemExit(ended.stderr)
-    found: dict[str, float] = json.loads(ended.stderr.splitlines()[-1])
-    return found
+    return {**dict.fromkeys(OTHERS, 0.0), **json.loads(ended.stderr.splitlines()[-1])}
 
 
 class Clock:
@@ -128,19 +159,24 @@ class Clock:
     def __init__(self) -> None:
         self.times = dict.fromkeys(PARTS, 0.0)
         self._inner: list[float] = []
+        self._longer = 0
 
     def wrap(self, owner: Any, name: str, part: str) -> None:
         """Replace a function or method by one that is timed."""
         called: Callable[..., Any] = getattr(owner, name)
 
         def with_time(*arguments: Any, **options: Any) -> Any:
+            # The kernel within a longer record counts for the record.
+            self._longer += part == LONGER
+            own = LONGER if self._longer else part
             self._inner.append(0.0)
             began = time.process_time()
             try:
                 return called(*arguments, **options)
             finally:
                 took = time.process_time() - began
-                self.times[part] += took - self._inner.pop()
+                self.times[own] += took - self._inner.pop()
+                self._longer -= part == LONGER
                 if self._inner:
                     self._inner[-1] += took
 
@@ -150,9 +186,11 @@ class Clock:
 def command(words: list[str]) -> None:
     """Run a command of gearchaos in this process; print the times of its parts as JSON."""
     sys.path.pop(0)
+    began = time.perf_counter()
     import gearchaos_kernels.batch as batch
     from numba.core.dispatcher import Dispatcher
 
+    import gearchaos.dynamics.labelling as labelling
     import gearchaos.engine.kept as kept
     import gearchaos.engine.running  # noqa: F401
     from gearchaos.results.files.block_store import BlockStore
@@ -161,6 +199,7 @@ def command(words: list[str]) -> None:
     clock.times["start-up"] = time.process_time()
     clock.wrap(Dispatcher, "compile", "compilation")
     clock.wrap(batch, "_integrate_blocks", "kernel")
+    clock.wrap(labelling, "integrate", LONGER)
     clock.wrap(kept, "labels_of", "labels")
     clock.wrap(BlockStore, "write", "files")
     clock.wrap(BlockStore, "merge", "files")
@@ -170,7 +209,9 @@ def command(words: list[str]) -> None:
     except SystemExit as ended:
         if ended.code:
             raise
-    sys.stderr.write("\n" + json.dumps({"total": time.process_time(), **clock.times}) + "\n")
+    found = {"total": time.process_time(), **clock.times, "clock": time.perf_counter() - began}
+    found["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    sys.stderr.write("\n" + json.dumps(found) + "\n")
 
 
 if __name__ == "__main__":

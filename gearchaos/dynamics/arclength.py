@@ -5,13 +5,13 @@ follows the tangent of the curve. A fold is a regular point of the curve. The mu
 therefore found on both sides of +1, however fast it changes with the parameter.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple, Self
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
 
-from gearchaos.arrays import Complex, Floats
+from gearchaos.arrays import Complex, Floats, Integers
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
@@ -178,15 +178,26 @@ class Curve(NamedTuple):
         ``guess`` and ``direction``: shape (states + 1,). Newton's method; None where it does not
         converge.
         """
+        correction = self.correcting(guess, direction)
+        try:
+            request = next(correction)
+            while True:
+                request = correction.send(self._defect(request))
+        except StopIteration as ended:
+            found: CurvePoint | None = ended.value
+            return found
+
+    def correcting(self, guess: Floats, direction: Floats) -> "Search[CurvePoint | None]":
+        """Correct a guess as `corrected`; yields `Request` and is sent their `Defect`."""
         place, last = guess, np.inf
         by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
-            defect, slopes, passed = self._defect(place, by_share)
+            defect, slopes, passed = yield Request(place, by_share)
             size = float(np.max(np.abs(defect)))
             # Rounding of the state grows with the largest multiplier.
             if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
                 if by_share is not None and np.linalg.norm(place - guess) > NEAR_ENOUGH:
-                    slopes = self._defect(place)[1]
+                    slopes = (yield Request(place)).slopes
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, size, passed)
@@ -212,35 +223,24 @@ class Curve(NamedTuple):
     def jacobian(self, place: Floats) -> Floats:
         """Return the Jacobian of the map over the period, in the scales, (states, states)."""
         states = self.scale.size
-        slopes: Floats = self._defect(place, np.zeros(states))[1][:, :-1]
+        slopes: Floats = self._defect(Request(place, np.zeros(states))).slopes[:, :-1]
         return slopes + np.eye(states)
 
-    def _defect(
-        self, place: Floats, by_share: Floats | None = None
-    ) -> tuple[Floats, Floats, Outcome]:
-        """Return P(x) - x in the scales, its derivatives by place, and the motion.
+    def _defect(self, request: "Request") -> "Defect":
+        """Return the defect at a place."""
+        return defects_of([self], [request], lambda _numbers, shares: self.system_at(shares))[0]
 
-        ``by_share`` (states,): the derivative by the share of the way, if it is known.
-        """
-        states = self.scale.size
-        # Beyond the ends of the way the value of the parameter may be invalid.
-        share = min(max(float(place[-1]), 0.0), 1.0)
-        beside = share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)
-        shares = np.array([share] if by_share is not None else [share, beside])
-        # One lane for each column of the Jacobian, and one for the difference by the parameter.
-        lanes = np.repeat([0, 1], [states, 1])[: states + shares.size - 1]
-        start = np.repeat((place[:-1] * self.scale)[np.newaxis], lanes.size, axis=0)
-        tangents = np.eye(states)[[*range(states), 0]][: lanes.size]
-        system = self.system_at(shares).of(lanes)
-        passed = integrate(system, start, self.plan, tangent_start=tangents)
-        passed = passed.every(system.repeats_after)
+    def defect_of(self, request: "Request", passed: Outcome) -> "Defect":
+        """Return the defect at a place, from the motion of its lanes."""
+        states, by_share = self.scale.size, request.by_share
         ends = passed.section[:, -1] / self.scale
         columns = passed.end_tangent * np.exp(np.sum(passed.growth, axis=1))[:, np.newaxis]
         jacobian = columns[:states].T * self.scale / self.scale[:, np.newaxis]
         if by_share is None:
+            share, beside = request.shares()
             by_share = (ends[-1] - ends[0]) / (beside - share)
         slopes = np.column_stack([jacobian - np.eye(states), by_share])
-        return ends[0] - place[:-1], slopes, passed
+        return Defect(ends[0] - request.place[:-1], slopes, passed)
 
     def _point(
         self, place: Floats, slopes: Floats, direction: Floats, size: float, passed: Outcome
@@ -259,8 +259,91 @@ class Curve(NamedTuple):
         return CurvePoint(place, tangent, multipliers, size, halfway, impacts, section)
 
 
-def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width: float) -> End:
+class Request(NamedTuple):
+    """A place of a curve whose defect is needed.
+
+    Attributes
+    ----------
+    place : array, shape (states + 1,)
+        The state in its scales, then the share of the way.
+    by_share : array, shape (states,), or None
+        The derivative of the map by the share of the way, if it is known.
+    """
+
+    place: Floats
+    by_share: Floats | None = None
+
+    def shares(self) -> list[float]:
+        """Return the share of the place, and one beside it if the derivative is unknown."""
+        # Beyond the ends of the way the value of the parameter may be invalid.
+        share = min(max(float(self.place[-1]), 0.0), 1.0)
+        beside = share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)
+        return [share] if self.by_share is not None else [share, beside]
+
+
+class Defect(NamedTuple):
+    """How far an orbit is from being closed.
+
+    Attributes
+    ----------
+    distance : array, shape (states,)
+        P(x) - x in the scales; P is the map over the period.
+    slopes : array, shape (states, states + 1)
+        Its derivatives by the place.
+    passed : Outcome
+        The motion of the lanes of the place, with one section point per excitation period.
+    """
+
+    distance: Floats
+    slopes: Floats
+    passed: Outcome
+
+
+_Found = TypeVar("_Found")
+Search = Generator[Request, Defect, _Found]
+"""Yields places of a curve, is sent their defects, and returns what was sought."""
+
+
+def defects_of(
+    curves: Sequence[Curve],
+    requests: Sequence[Request],
+    systems_at: Callable[[Integers, Floats], LaneSystem],
+) -> list[Defect]:
+    """Return the defects at places of curves, one each, from one integration.
+
+    The curves differ in periods and scales only. ``systems_at`` returns the system of lanes from
+    numbers of curves and shares of the way, both (lanes,).
+    """
+    states = curves[0].scale.size
+    shares = [request.shares() for request in requests]
+    known = np.array([len(one) for one in shares])
+    system = systems_at(np.repeat(np.arange(len(curves)), known), np.concatenate(shares))
+    # One lane for each column of the Jacobian, and one for the difference by the parameter.
+    copies = np.concatenate([[states, 1][:count] for count in known])
+    lanes, counts = system.of(np.repeat(np.arange(copies.size), copies)), states + known - 1
+    points = [one.place[:-1] * curve.scale for curve, one in zip(curves, requests, strict=True)]
+    tangents = np.concatenate([np.eye(states)[[*range(states), 0]][:count] for count in counts])
+    periods = np.array([curve.plan.recorded_periods for curve in curves])
+    longest = int(periods.max())
+    plan = curves[0].plan._replace(recorded_periods=longest, section_points=longest)
+    start, own = np.repeat(points, counts, axis=0), np.repeat(periods, counts)
+    passed = integrate(lanes, start, plan, tangent_start=tangents, periods=own)
+    found, first = [], 0
+    for curve, request, whole, count in zip(curves, requests, periods, counts, strict=True):
+        parts: Any = (array[first : first + count] for array in passed)
+        one = Outcome(*parts)
+        one = one._replace(section=one.section[:, -whole:], growth=one.growth[:, :whole])
+        found.append(curve.defect_of(request, one.every(system.repeats_after)))
+        first += count
+    return found
+
+
+def end_of_curve(
+    curve: Curve, point: Floats, share: float, limit: float, width: float
+) -> Search[End]:
     """Follow a curve from a stable orbit onwards to where it loses stability or turns back.
+
+    Yields places of the curve and is sent their defects, so that curves advance side by side.
 
     Parameters
     ----------
@@ -276,11 +359,12 @@ def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width:
     width : float
         Largest difference in share between both sides of the end.
     """
-    here = curve.corrected(np.append(point / curve.scale, share), along_the_way(point.size))
+    guess = np.append(point / curve.scale, share)
+    here = yield from curve.correcting(guess, along_the_way(point.size))
     step = FIRST_STEP
     for _ in range(MOST_CURVE_STEPS if here is not None else 0):
         assert here is not None
-        trial = curve.corrected(here.place + step * here.tangent, here.tangent)
+        trial = yield from curve.correcting(here.place + step * here.tangent, here.tangent)
         bends = trial is None or trial.tangent @ here.tangent < STRAIGHT
         if trial is None or bends:
             step /= 2.0
@@ -289,10 +373,10 @@ def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width:
             continue
         end = End(trial, None)
         if not trial.before_its_end:
-            end = _located(curve, here, trial, width)
+            end = yield from _located(curve, here, trial, width)
         assert end.inner is not None
         if end.inner.share >= limit:
-            return End(_at_share(curve, here, end.inner, limit), None)
+            return End((yield from _at_share(curve, here, end.inner, limit)), None)
         if end.beyond is not None:
             return end
         here, step = end.inner, min(2.0 * step, LONGEST_CURVE_STEP)
@@ -304,22 +388,25 @@ def along_the_way(states: int) -> Floats:
     return np.append(np.zeros(states), 1.0)
 
 
-def _at_share(curve: Curve, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint | None:
+def _at_share(
+    curve: Curve, one: CurvePoint, other: CurvePoint, share: float
+) -> Search[CurvePoint | None]:
     """Return the point of the curve at a share between the shares of two points."""
     part = (share - one.share) / (other.share - one.share)
     guess = one.place + part * (other.place - one.place)
     guess[-1] = share
-    return curve.corrected(guess, along_the_way(guess.size - 1))
+    return (yield from curve.correcting(guess, along_the_way(guess.size - 1)))
 
 
-def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> End:
+def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> Search[End]:
     """Bisect the stretch of a curve in which it loses stability or turns back."""
     for _ in range(MOST_HALVINGS):
         chord = beyond.place - inner.place
         moduli = abs(abs(beyond.multipliers[0]) - abs(inner.multipliers[0]))
         if np.linalg.norm(chord) <= NEAR_ON_CURVE and moduli <= APART and abs(chord[-1]) <= width:
             break
-        middle = curve.corrected((inner.place + beyond.place) / 2.0, chord / np.linalg.norm(chord))
+        guess = (inner.place + beyond.place) / 2.0
+        middle = yield from curve.correcting(guess, chord / np.linalg.norm(chord))
         if middle is None:
             break
         if middle.before_its_end:

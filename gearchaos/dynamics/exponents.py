@@ -8,14 +8,12 @@ of tangent vectors are Euclidean in the dimensionless states.
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate, jacobian
+from gearchaos_kernels import LANES, LaneSystem, Outcome, Plan, integrate, jacobian
+from gearchaos_kernels.recorders.frame import SMALLEST_RESOLVED
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.modes import memory
 from gearchaos.records.lyapunov import largest_exponent
-
-SMALLEST_RESOLVED = 1e-8
-"""Smallest share of a tangent vector that must remain after orthogonalisation."""
 
 
 class Exponents(NamedTuple):
@@ -87,10 +85,35 @@ def _stretches(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
     They are NaN from the first direction on that double precision does not resolve.
     """
     lanes, states = start.shape
-    logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
     # The first vector has equal components, as the single vector of the kernels.
     frame, _ = np.linalg.qr(np.column_stack([np.ones(states), np.eye(states)[:, 1:]]))
-    frame, state = np.broadcast_to(frame, (lanes, states, states)), start
+    if states > LANES:
+        return _stretches_by_period(
+            system, start, np.broadcast_to(frame, (lanes, *frame.shape)), plan
+        )
+    lengths = plan.steps_per_period, plan.transient_periods, plan.recorded_periods
+    framed = Plan(
+        *lengths,
+        section_points=0,
+        tangent=True,
+        resolved=plan.resolved,
+        method=plan.method,
+        first_period=plan.first_period,
+        frame=True,
+    )
+    outcome = integrate(
+        system.repeated(states),
+        np.repeat(start, states, axis=0),
+        framed,
+        tangent_start=np.tile(frame.T, (lanes, 1)),
+    )
+    return outcome.growth.reshape(lanes, states, -1)
+
+
+def _stretches_by_period(system: LaneSystem, state: Floats, frame: Floats, plan: Plan) -> Floats:
+    """Return what `_stretches` returns; the kernels have no frames of more than 32 states."""
+    lanes, states = state.shape
+    logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
     for period in range(-plan.transient_periods, plan.recorded_periods):
         once = plan._replace(recorded_periods=1, first_period=plan.transient_periods + period)
         state, vectors, growth = _carry(system, state, frame, once)

@@ -6,13 +6,14 @@ of the elements are continuous, so that the map over a period has a continuous d
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
 
-from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
-from gearchaos.dynamics.arclength import Curve, End, end_of_curve
+from gearchaos.arrays import Codes, Complex, Counts, Floats, Integers, Mask
+from gearchaos.dynamics.arclength import Curve, End, Search, defects_of, end_of_curve
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability
 
@@ -146,8 +147,8 @@ def follow(
     for _ in range(1 + MOST_CURVES):
         lanes.march(going)
         going = np.zeros_like(going)
-        for lane in np.flatnonzero(lanes.unexplained).tolist():
-            going[lane] = lanes.follow_curve(lane)
+        lost = np.flatnonzero(lanes.unexplained)
+        going[lost] = lanes.follow_curves(lost.tolist())
         if not going.any():
             break
     return lanes.followed
@@ -235,24 +236,51 @@ class _Lanes:
             going = going & (step > self._smallest / 2.0) & (self._share < 1.0)
         self._beyond.multipliers[going] = np.nan
 
-    def follow_curve(self, lane: int) -> bool:
-        """Follow the curve of one lane to its end, and return whether it continues from there.
+    def follow_curves(self, lanes: list[int]) -> list[bool]:
+        """Follow the curves of lanes to their ends; return which continue from there.
 
-        The curve is followed at most one long step beyond the place where the orbit was missed.
+        A curve is followed at most one long step beyond the place where the orbit was missed.
         """
-        first, way, share = self._first[lane], self._way[lane], float(self._share[lane])
-        point, periods = self.stable.points[lane], int(self._period[lane])
-        limit = min(max(share, float(self._end[lane])) + LONGEST_SHARE, 1.0)
-        width = float(self._smallest[lane])
+        share = np.minimum(np.maximum(self._share, self._end) + LONGEST_SHARE, 1.0)
+        limits, curves, searches = share.tolist(), {}, {}
+        for lane in lanes:
+            system_at = partial(self._systems, np.array([lane]), 0)
+            at, point = float(self._share[lane]), self.stable.points[lane]
+            curve = Curve.through(system_at, self._plan, int(self._period[lane]), point, at)
+            width = float(self._smallest[lane])
+            curves[lane] = curve
+            searches[lane] = end_of_curve(curve, point, at, limits[lane], width)
+        ends = self._ends(curves, searches)
+        return [self._continued(lane, ends[lane], curves[lane], limits[lane]) for lane in lanes]
 
-        def system_at(shares: Floats) -> LaneSystem:
-            return self._system_at(first + shares * way)
+    def _systems(self, lanes: Integers, numbers: int | Integers, shares: Floats) -> LaneSystem:
+        """Return the systems of some of the lanes, by their numbers, at shares of their ways."""
+        chosen = lanes[numbers]
+        return self._system_at(self._first[chosen] + shares * self._way[chosen])
 
-        curve = Curve.through(system_at, self._plan, periods, point, share)
-        end = end_of_curve(curve, point, share, limit, width)
+    def _ends(self, curves: dict[int, Curve], searches: dict[int, Search[End]]) -> dict[int, End]:
+        """Advance searches along the curves of lanes side by side, and return what they find."""
+        ends: dict[int, End] = {}
+        answers: dict[int, Any] = dict.fromkeys(searches)
+        while True:
+            requests = {}
+            for lane, answer in answers.items():
+                try:
+                    requests[lane] = searches[lane].send(answer)
+                except StopIteration as ended:
+                    ends[lane] = ended.value
+            if not requests:
+                return ends
+            systems_at = partial(self._systems, np.array([*requests]))
+            moved = [curves[lane] for lane in requests]
+            defects = defects_of(moved, [*requests.values()], systems_at)
+            answers = dict(zip(requests, defects, strict=True))
+
+    def _continued(self, lane: int, end: End, curve: Curve, limit: float) -> bool:
+        """Set a lane to the end of its followed curve; return whether the curve continues."""
         if end.inner is None or (end.beyond is None and end.inner.share < limit):
             return False
-        self._put(lane, end, curve.scale, width)
+        self._put(lane, end, curve.scale, float(self._smallest[lane]))
         continues = end.beyond is None and limit < 1.0
         if continues:
             self._beyond.multipliers[lane] = np.nan

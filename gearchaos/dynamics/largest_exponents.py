@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan
+from gearchaos_kernels.recorders.frame import SMALLEST_RESOLVED
 
 from gearchaos.arrays import Codes, Counts, Floats
-from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
 from gearchaos.dynamics.modes import memory
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.label import CHAOTIC_GROWTH

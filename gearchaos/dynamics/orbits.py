@@ -3,10 +3,10 @@
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate
+from gearchaos_kernels import LaneSystem, Plan
 
-from gearchaos.arrays import Complex, Counts, Floats, Mask
-from gearchaos.dynamics.exponents import period_jacobian
+from gearchaos.arrays import Complex, Counts, Floats, Integers, Mask
+from gearchaos.dynamics.period_maps import PeriodMaps
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 CLOSED = 1e-12
@@ -88,67 +88,95 @@ def polish(
     motion. A step is halved until the return distance falls. A state is measured by its largest
     magnitude on the section, or by a thousandth of the largest state if that is more.
     """
-    found = Orbits(
+    chosen = np.flatnonzero(period > 0)
+    orbits = Orbits(
         points=np.full(guess.shape, np.nan),
         multipliers=np.full(guess.shape, np.nan, dtype=np.complex128),
         monodromy=np.full((*guess.shape, guess.shape[1]), np.nan),
         residual=np.full(guess.shape[0], np.nan),
         converged=np.zeros(guess.shape[0], dtype=np.bool_),
     )
-    for n in np.unique(period[period > 0]).tolist():
-        chosen = np.flatnonzero(period == n)
-        # With a tangent: map and Jacobian then share one kernel and agree bit for bit.
-        whole = n * system.repeats_after
-        once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
-        polished = _polish(system.of(chosen), guess[chosen], once, scale)
-        for all_lanes, some in zip(found, polished, strict=True):
+    if chosen.size:
+        maps = PeriodMaps.with_method(system.of(chosen), period[chosen], plan)
+        search = _Search(maps, guess[chosen], scale)
+        for all_lanes, some in zip(orbits, search.found(), strict=True):
             all_lanes[chosen] = some
-    return found
+    return orbits
 
 
-def _polish(system: LaneSystem, guess: Floats, plan: Plan, given: Floats | None) -> Orbits:
-    """Find the orbits of lanes with one period; ``guess`` (lanes, states), ``given`` scales."""
-    lanes = np.arange(guess.shape[0])
-    start, points = guess, guess.copy()
-    repeats = system.repeats_after
-    section = integrate(system, points, plan).every(repeats).section
-    scale = coordinate_scale(section) if given is None else np.tile(given, (lanes.size, 1))
-    residual = _distance(section[:, -1], points, scale)
-    searching = np.isfinite(residual)
-    for _ in range(NEWTON_STEPS):
-        searching &= residual > CLOSED
-        rest = lanes[searching]
-        if not rest.size:
-            break
-        step = np.zeros_like(points)
-        step[rest] = _newton_step(
-            period_jacobian(system.of(rest), points[rest], plan), section[rest, -1] - points[rest]
-        )
-        for share in _SHARES:
-            trial = points[rest] + share * step[rest]
-            passed = integrate(system.of(rest), trial, plan).every(repeats).section
-            distance = _distance(passed[:, -1], trial, scale[rest])
-            # At least half of the predicted decrease: beyond a fold it falls, but not to 0.
-            better = distance < (1.0 - share / 2.0) * residual[rest]
-            better &= _distance(trial, start[rest], scale[rest]) < NEIGHBOURHOOD
-            taken = rest[better]
-            points[taken], section[taken] = trial[better], passed[better]
-            residual[taken] = distance[better]
-            rest = rest[~better]
-            if not rest.size:
+class _Search:
+    """Newton's method for the orbits of some lanes.
+
+    ``guess`` (lanes, states); ``scale`` (states,): scales of the states, or None for those of the
+    section of each lane.
+    """
+
+    def __init__(self, maps: PeriodMaps, guess: Floats, scale: Floats | None) -> None:
+        self._maps, self._guess, self._points = maps, guess, guess.copy()
+        passage = maps.passed(guess)
+        self._section, self._jacobian = passage.section, passage.jacobian
+        # The points before the first are NaN.
+        recorded = np.where(np.isnan(self._section), self._section[:, -1:], self._section)
+        given = None if scale is None else np.tile(scale, (guess.shape[0], 1))
+        self._scale = coordinate_scale(recorded) if given is None else given
+        self._residual = _distance(self._section[:, -1], guess, self._scale)
+        # Where a part of a step is taken, the Jacobian is computed before the next step.
+        self._known = np.ones(guess.shape[0], dtype=np.bool_)
+
+    def found(self) -> Orbits:
+        """Search, and return the orbits."""
+        searching = np.isfinite(self._residual)
+        for _ in range(NEWTON_STEPS):
+            searching &= self._residual > CLOSED
+            lanes = np.flatnonzero(searching)
+            if not lanes.size:
                 break
-        searching[rest] = False
-    converged = (residual <= CLOSED) & ~_repeats_earlier(section, points, scale)
-    closed = lanes[converged]
-    points[~converged] = np.nan
-    multipliers = np.full(points.shape, np.nan, dtype=np.complex128)
-    monodromy = np.full((*points.shape, points.shape[1]), np.nan)
-    if closed.size:
-        monodromy[closed] = period_jacobian(system.of(closed), points[closed], plan)
-        found = np.linalg.eigvals(monodromy[closed])
-        order = np.argsort(-np.abs(found), axis=1, kind="stable")
-        multipliers[closed] = np.take_along_axis(found, order, axis=1)
-    return Orbits(points, multipliers, monodromy, residual, converged)
+            searching[lanes] = self._take_step(lanes)
+        converged = self._residual <= CLOSED
+        converged &= ~_repeats_earlier(self._section, self._points, self._scale, self._maps.period)
+        closed = np.flatnonzero(converged)
+        self._complete(closed)
+        self._points[~converged] = np.nan
+        self._jacobian[~converged] = np.nan
+        multipliers = np.full(self._points.shape, np.nan, dtype=np.complex128)
+        if closed.size:
+            found = np.linalg.eigvals(self._jacobian[closed])
+            order = np.argsort(-np.abs(found), axis=1, kind="stable")
+            multipliers[closed] = np.take_along_axis(found, order, axis=1)
+        return Orbits(self._points, multipliers, self._jacobian, self._residual, converged)
+
+    def _take_step(self, lanes: Integers) -> Mask:
+        """Take the largest share of a Newton step that closes lanes better; return where any does.
+
+        All shares are tried side by side, the whole step together with its Jacobian.
+        """
+        self._complete(lanes)
+        points, section = self._points[lanes], self._section[lanes]
+        step = _newton_step(self._jacobian[lanes], section[:, -1] - points)
+        trials = points + np.multiply.outer(np.array(_SHARES), step)
+        maps, parts = self._maps.of(lanes), np.tile(np.arange(lanes.size), len(_SHARES) - 1)
+        whole = maps.passed(trials[0], np.concatenate(trials[1:]), parts)
+        passed = np.concatenate([whole.section, whole.aside]).reshape(-1, *section.shape)
+        taken = np.zeros(lanes.size, dtype=np.bool_)
+        for number, share in enumerate(_SHARES):
+            distance = _distance(passed[number, :, -1], trials[number], self._scale[lanes])
+            # At least half of the predicted decrease: beyond a fold it falls, but not to 0.
+            better = ~taken & (distance < (1.0 - share / 2.0) * self._residual[lanes])
+            away = _distance(trials[number], self._guess[lanes], self._scale[lanes])
+            better &= away < NEIGHBOURHOOD
+            one = lanes[better]
+            self._points[one], self._section[one] = trials[number, better], passed[number, better]
+            self._jacobian[one], self._known[one] = whole.jacobian[better], number == 0
+            self._residual[one] = distance[better]
+            taken |= better
+        return taken
+
+    def _complete(self, lanes: Integers) -> None:
+        """Compute missing Jacobians at the points of lanes."""
+        lanes = lanes[~self._known[lanes]]
+        if lanes.size:
+            self._jacobian[lanes] = self._maps.of(lanes).passed(self._points[lanes]).jacobian
+            self._known[lanes] = True
 
 
 def _newton_step(jacobian: Floats, returned: Floats) -> Floats:
@@ -166,11 +194,11 @@ def _distance(one: Floats, other: Floats, scale: Floats) -> Floats:
     return distance
 
 
-def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> Mask:
+def _repeats_earlier(section: Floats, points: Floats, scale: Floats, period: Counts) -> Mask:
     """Whether an orbit returns after a proper divisor of its period, (lanes,)."""
-    periods = section.shape[1]
     repeats = np.zeros(points.shape[0], dtype=np.bool_)
-    for divisor in range(1, periods // 2 + 1):
-        if periods % divisor == 0:
-            repeats |= _distance(section[:, divisor - 1], points, scale) <= TOLERANCE
+    for divisor in range(1, int(period.max(initial=0)) // 2 + 1):
+        lanes = np.flatnonzero((period % divisor == 0) & (period > divisor))
+        returned = section[lanes, divisor - 1 - period[lanes]]
+        repeats[lanes] |= _distance(returned, points[lanes], scale[lanes]) <= TOLERANCE
     return repeats

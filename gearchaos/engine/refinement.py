@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
-from gearchaos.arrays import Array, Floats
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.following import Followed, follow
 from gearchaos.dynamics.labelling import LONGER_RECORDS, labels_of
 from gearchaos.dynamics.plans import plan_of
@@ -69,9 +69,9 @@ def refined_boundaries(
 ) -> list[Boundary]:
     """Bisect every boundary between two stages, and follow the orbits next to it.
 
-    All boundaries are bisected together, with one batch of lanes per round, until the lanes on both
-    sides are at most ``width`` apart. A boundary is the end of the label below: any other label
-    counts as the upper side. ``config``: from `refinable`; ``stages``: of this result.
+    All boundaries are bisected together until the lanes on both sides are at most ``width`` apart.
+    A boundary is the end of the label below: any other label counts as the upper side. ``config``:
+    from `refinable`; ``stages``: of this result.
     """
     if len(stages) < 2:
         return []
@@ -79,20 +79,30 @@ def refined_boundaries(
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
     spacing = above["value"] - below["value"]
-    while True:
-        middle = (below["value"] + above["value"]) / 2.0
-        wide = (below["value"] < middle) & (middle < above["value"])
-        wide = np.flatnonzero(wide & (above["value"] - below["value"] > width))
-        if not wide.size:
-            break
-        tried = _computed(run, {config.sweep.parameter: middle[wide]})
+    while (wide := _wide(below, above, width)).size:
+        low, high = below["value"][wide], above["value"][wide]
+        middle = (low + high) / 2.0
+        # Two halvings in one batch: longer records of few lanes take as long as those of many.
+        trials = np.concatenate([(low + middle) / 2.0, middle, (middle + high) / 2.0])
+        tried = _computed(run, {config.sweep.parameter: trials}).reshape(3, wide.size)
         same = tried["label"] == below["label"][wide]
-        below[wide[same]], above[wide[~same]] = tried[same], tried[~same]
+        below[wide[same[1]]], above[wide[~same[1]]] = tried[1, same[1]], tried[1, ~same[1]]
+        again = np.isin(wide, _wide(below, above, width))
+        for number, half in (0, ~same[1]), (2, same[1]):
+            up, down = again & half & same[number], again & half & ~same[number]
+            below[wide[up]], above[wide[down]] = tried[number, up], tried[number, down]
     losses = _losses(config, below, above, spacing)
     return [
         Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
         for one, other, loss in zip(below, above, losses, strict=True)
     ]
+
+
+def _wide(below: Array, above: Array, width: float) -> Integers:
+    """Return the numbers of the boundaries that are bisected further."""
+    low, high = below["value"], above["value"]
+    middle = (low + high) / 2.0
+    return np.flatnonzero((low < middle) & (middle < high) & (high - low > width))
 
 
 def refined_map(
@@ -214,14 +224,16 @@ def _losses(
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below each boundary upwards and those above it downwards."""
     # Labels change slightly before or after a bifurcation: follow one lane further.
-    upwards = _followed(config, below, above["value"] + spacing)
-    downwards = _followed(config, above, below["value"] - spacing)
+    ends = above["value"] + spacing, below["value"] - spacing
+    edges = np.concatenate([below, above])
+    # Both ways side by side: few lanes take as long as many.
+    followed = _followed(config, edges, np.concatenate(ends))
     losses = []
     for number in range(spacing.size):
         sides = [
-            (followed.loss[number], complex(followed.multiplier[number]))
-            for followed, edge in ((upwards, below), (downwards, above))
-            if edge["period"][number] > 0
+            (followed.loss[lane], complex(followed.multiplier[lane]))
+            for lane in (number, spacing.size + number)
+            if edges["period"][lane] > 0
         ]
         loss, multiplier = min(sides, key=itemgetter(0), default=(None, complex("nan")))
         losses.append(("" if loss is None else STABILITY_LOSS_TEXTS[loss], multiplier))

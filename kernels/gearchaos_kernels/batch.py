@@ -1,6 +1,7 @@
 """Integrate a batch: split lanes into blocks, run the blocks in parallel, return arrays."""
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import get_num_threads, prange
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
-from gearchaos_kernels.control import Actuation, Control
-from gearchaos_kernels.methods.protocol import Share
+from gearchaos_kernels.control import Actuation, Control, Feedback
+from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.methods.protocol import Share, with_periods
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats, Outcome, Plan, Schedule, Status
@@ -40,23 +42,29 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, control
 
 def scene_of(system: LaneSystem, plan: Plan, control: Control | None = None) -> Scene:
     """Return the scene that a system, a plan and a controller need."""
-    method, flags = METHODS[plan.method], system.flags()
-    model = provider_of(flags)
+    return _scene_of(system.flags(), system.clearance, plan, control and control.flags())
+
+
+@lru_cache(maxsize=256)
+def _scene_of(flags: Any, clearance: bool, plan: Plan, feedback: Feedback | None) -> Scene:
+    """Return the scene of a model with flags; kept, because short calls follow each other."""
+    method, model = METHODS[plan.method], provider_of(flags)
     switches = model.switches(flags)
-    resolved = system.clearance and (plan.resolved or method.always_resolved)
+    resolved = clearance and (plan.resolved or method.always_resolved)
     wanted = [one for one in RECORDERS if one.wanted(plan, resolved)]
     return Scene(
         model=flags,
         method=method.flags(),
         recorders=Recorded(*(flag(one in wanted) for one in RECORDERS)),
-        clearance=flag(system.clearance),
+        clearance=flag(clearance),
         resolved=flag(resolved),
         tangent=flag(plan.tangent),
         before=flag(resolved or any(one.reads_before for one in wanted)),
         switches=flag(switches),
+        traced=flag(method.traces and plan.loads and not plan.records_steps),
         jumps=flag(resolved and any(kind.damped_in_contact for kind in model.kinds_of(flags))),
-        control=flag(control),
-        feedback=control.flags() if control else None,
+        control=flag(feedback),
+        feedback=feedback,
     )
 
 
@@ -67,6 +75,7 @@ def integrate(
     *,
     tangent_start: Floats | None = None,
     control: Control | None = None,
+    periods: NDArray[np.integer] | None = None,
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0.
 
@@ -82,48 +91,74 @@ def integrate(
         Tangent vectors at tau = 0; by default all components are equal and the length is 1.
     control : Control, optional
         The controller of every lane; by default there is none.
+    periods : array of int, shape (lanes,), optional
+        Recorded periods of every lane, at most those of the plan, which is the default. The section
+        of a lane with fewer begins with NaN, and its growth ends with 0.
 
     Returns
     -------
     Outcome
-        It is identical bit for bit for any number of threads and any split or order of the lanes.
+        Identical bit for bit for any number of threads and any split or order of the lanes.
 
     Raises
     ------
     ValueError
-        If the method cannot integrate the system, see `LaneSystem.refuses_maps`, if amplitudes are
-        requested of a model without observed signals, if a model without a steady input is
-        controlled, or if the system is beyond what the model supports.
+        If method, model or kernels do not support the request, see `LaneSystem.refuses_maps`.
 
     Examples
     --------
     ::
 
-        start = np.zeros((pairs.lanes, len(pairs.states)))
         outcome = integrate(pairs, start, Plan(200, 300, 100, 100, tangent=True))
         exponents = outcome.growth.mean(axis=1) / pairs.mesh_period
     """
     lanes, states = start.shape[0], len(system.states)
-    if tangent_start is None:
-        tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
     scene = scene_of(system, plan, control)
-    if control and not provider_of(scene.model).actuated:
-        raise ValueError("control needs a model with a steady input")
-    if plan.orders and not provider_of(scene.model).observed:
-        raise ValueError("amplitudes need a model with an observed signal")
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
+    recorded = _recorded_periods(plan, periods, outcome)
     begins = _Beginning(start, tangent_start, control)
-    for share in METHODS[plan.method].prepare(system, plan, scene):
+    for prepared in METHODS[plan.method].prepare(system, plan, scene, recorded):
+        share = with_periods(prepared, recorded, plan.lanes_together(states))
         steps_taken[share.order] = share.steps[share.order]
         _integrate_share(system, share, begins, plan, outcome, scene)
-    return _per_tau(system, plan, outcome, steps_taken, scene)
+    return _per_tau(system, plan, outcome, steps_taken, recorded, scene)
+
+
+def _tangents(shape: tuple[int, ...], given: Floats | None) -> Floats:
+    """Return tangent vectors at tau = 0, (lanes, states)."""
+    return np.full(shape, 1.0 / np.sqrt(shape[1])) if given is None else given
+
+
+def _recorded_periods(
+    plan: Plan, periods: NDArray[np.integer] | None, outcome: Outcome
+) -> NDArray[np.intp]:
+    """Return the recorded periods of every lane; fill what shorter records leave unwritten."""
+    recorded = np.full(outcome.status.shape, plan.recorded_periods, dtype=np.intp)
+    if periods is not None:
+        recorded[:] = periods
+        for kept, rest in (outcome.section, np.nan), (outcome.history, np.nan), (outcome.growth, 0):
+            kept.fill(rest)
+    return recorded
+
+
+def _require_supported(scene: Scene, plan: Plan, states: int) -> None:
+    """Raise ValueError if the model or the kernels cannot record what a plan requests."""
+    if plan.orders and not provider_of(scene.model).observed:
+        raise ValueError("amplitudes need a model with an observed signal")
+    if plan.frame and states > LANES:
+        raise ValueError(f"a frame of {states} states is larger than a block of {LANES} lanes")
+    if scene.control and not provider_of(scene.model).actuated:
+        raise ValueError("control needs a model with a steady input")
 
 
 class _Beginning(NamedTuple):
-    """States and tangent vectors at tau = 0, both (lanes, states), and the controllers."""
+    """States and tangent vectors at tau = 0, both (lanes, states), and the controllers.
+
+    None stands for tangent vectors of equal components, and for no controllers.
+    """
 
     start: Floats
-    tangent_start: Floats
+    tangent_start: Floats | None
     control: Control | None
 
 
@@ -136,10 +171,10 @@ def _integrate_share(
     scene: Scene,
 ) -> None:
     """Integrate some lanes and write what is recorded of them into an outcome."""
-    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in begins[:2])
+    given = begins.start, _tangents(begins.start.shape, begins.tangent_start)
+    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in given)
     chosen = np.array([*_columns(system, plan), _observed_row(scene)], dtype=np.intp)
     orders = np.array([float(order) for order in plan.orders])
-    phases = 2.0 * np.pi * orders / share.steps[:, np.newaxis]
     step = system.mesh_period / share.steps
     batch = Batch(
         system.coefficients(step),
@@ -153,7 +188,8 @@ def _integrate_share(
         share.lacked,
         share.progress,
         chosen,
-        np.stack([np.cos(phases), np.sin(phases)], axis=2),
+        _turns(orders, share.steps),
+        plan.frame,
     )
     # An empty array stands for no controller.
     control: Actuation | Floats = np.zeros(0)
@@ -162,7 +198,6 @@ def _integrate_share(
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
-        plan.recorded_periods,
         plan.first_period,
         plan.more_rows,
     )
@@ -195,13 +230,26 @@ def _actuation(
     return Actuation(**given, strength=one - none, inputs=inputs, about=about)
 
 
+def _turns(orders: Floats, steps: NDArray[np.intp]) -> Floats:
+    """Return cosine and sine of the phases by which orders advance in a step; see `Batch`."""
+    turns = np.empty((steps.size, orders.size, 2))
+    if orders.size:
+        phases = 2.0 * np.pi * orders / steps[:, np.newaxis]
+        turns[..., 0], turns[..., 1] = np.cos(phases), np.sin(phases)
+    return turns
+
+
 def _columns(system: LaneSystem, plan: Plan) -> list[int]:
     """Return the numbers of the states of a plan."""
     return [system.states.index(name) for name in plan.states]
 
 
 def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
-    """Return an outcome whose arrays have the shapes of what is recorded."""
+    """Return an outcome whose arrays have the shapes of what is recorded.
+
+    Raises ValueError if the model or the kernels do not support that.
+    """
+    _require_supported(scene, plan, states)
     elements = provider_of(scene.model).elements(scene.model)
     kept, loads = plan.history_periods, scene.recorders.loads
     in_contact = elements if scene.recorders.contact else 0
@@ -234,15 +282,23 @@ def _observed_row(scene: Scene) -> int:
 
 
 def _per_tau(
-    system: LaneSystem, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
+    system: LaneSystem,
+    plan: Plan,
+    outcome: Outcome,
+    steps_taken: NDArray[np.intp],
+    recorded: NDArray[np.intp],
+    scene: Scene,
 ) -> Outcome:
-    """Return an outcome in the units of the equations, from one that is recorded per step."""
+    """Return an outcome in the units of the equations, from one that is recorded per step.
+
+    ``recorded``: recorded periods of every lane, (lanes,).
+    """
     columns = _columns(system, plan)
     sums = outcome.amplitudes.reshape(len(steps_taken), len(columns) + 1, len(plan.orders))
     if not outcome.loads.size:
         return outcome._replace(amplitudes=sums)
     step = system.mesh_period / steps_taken
-    samples = (steps_taken * max(1, plan.recorded_periods))[:, np.newaxis, np.newaxis]
+    samples = (steps_taken * np.maximum(1, recorded))[:, np.newaxis, np.newaxis]
     elements = provider_of(scene.model).elements(scene.model)
     # Forces are per step squared; means are sums of Simpson's rule, six times too large.
     outcome.loads[:, :, 2:] /= 6.0 * samples
@@ -265,6 +321,8 @@ def steps_between_scalings(
     Between two scalings it must neither overflow nor vanish.
     """
     scalings = system.growth_rates() * system.mesh_period / LARGEST_GROWTH
+    if (scalings <= 1.0).all():
+        return np.full(scalings.shape, steps_per_period, dtype=np.intp)
     # Powers of two, so that the shortest interval of a block divides all others.
     interval = np.exp2(np.floor(np.log2(np.maximum(1.0, steps_per_period / scalings))))
     return np.where(scalings > 1.0, interval, steps_per_period).astype(np.intp)

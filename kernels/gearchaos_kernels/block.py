@@ -81,11 +81,13 @@ class Batch(NamedTuple):
     steps_between_scalings : array of int, shape (lanes,)
         Steps between two scalings of a tangent vector to length 1.
     order, blocks, maps, lacked, progress : array
-        See `methods.protocol.Share`.
+        See `methods.protocol.Share` and `methods.protocol.with_periods`.
     chosen : array of int, shape (states + 1,)
         Rows of the states whose extremes are recorded, then the row of the observed signal.
     turns : array, shape (lanes, orders, 2)
         Cosine and sine of the phase by which a mesh order advances in a step.
+    frame : bool
+        See `Plan`.
     """
 
     coefficients: NDArray[np.float64]
@@ -100,6 +102,7 @@ class Batch(NamedTuple):
     progress: NDArray[np.float64]
     chosen: NDArray[np.intp]
     turns: NDArray[np.float64]
+    frame: bool
 
 
 @part
@@ -111,14 +114,15 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
     align_stack()
     about = batch.blocks[number_of_block]
     first, lanes, steps, maps_at = about[0], about[1], about[2], about[3]
+    recorded_periods = about[4]
     memory = aligned_memory(rows(scene).total + plan.more_rows)
     lacked = batch.lacked[first : first + lanes]
-    given = StepInputs(tables, batch.maps, workspace(scene), about[4:], lacked)
+    given = StepInputs(tables, batch.maps, workspace(scene), about[5:], lacked)
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     substeps = steps // plan.steps_per_period
     interval = begin(memory, block, batch, given, plan.first_period, scene)
-    periods = plan.transient_periods + plan.recorded_periods
+    periods = plan.transient_periods + recorded_periods
     if any_stopped(lacked):
         return
     progress = batch.progress[number_of_block : number_of_block + 1]
@@ -146,7 +150,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
         clock = Clock(period, steps, steps, substeps, recorded, periods - 1 - period)
         end_period(memory, block, clock, records, scene)
         start_period(memory, block, batch, tables, plan.first_period + period + 1, scene)
-    clock = Clock(periods, steps, steps, substeps, plan.recorded_periods, 0)
+    clock = Clock(periods, steps, steps, substeps, recorded_periods, 0)
     end(memory, block, clock, records, scene)
 
 

@@ -47,6 +47,10 @@ class Plan(NamedTuple):
         recorded. The record must contain whole cycles of each.
     map_bytes : int
         Bytes of flow maps that are kept in memory. The maps of one lane are always kept.
+    frame : bool
+        Whether lanes that follow each other, as many as states, have the same motion and carry a
+        frame of tangent vectors, which is made orthonormal after every mesh period. At most 32
+        states.
 
     Examples
     --------
@@ -71,11 +75,16 @@ class Plan(NamedTuple):
     states: tuple[str, ...] = ()
     orders: tuple[Fraction, ...] = ()
     map_bytes: int = MAP_BYTES
+    frame: bool = False
 
     @property
     def records_steps(self) -> bool:
-        """Whether recorders read every step; flow maps then take shorter steps."""
-        return bool(self.loads or self.states or self.orders)
+        """Whether recorders read the end of every step; flow maps then take shorter steps."""
+        return bool(self.states or self.orders)
+
+    def lanes_together(self, states: int) -> int:
+        """Return the number of lanes that are not divided among blocks, a frame or one lane."""
+        return states if self.frame else 1
 
     @property
     def more_rows(self) -> int:
@@ -89,7 +98,7 @@ class Schedule(NamedTuple):
 
     Attributes
     ----------
-    steps_per_period, transient_periods, recorded_periods, first_period : int
+    steps_per_period, transient_periods, first_period : int
         See `Plan`.
     more_rows : int
         Rows of a block beyond those of the scene, for extremes and amplitudes.
@@ -97,7 +106,6 @@ class Schedule(NamedTuple):
 
     steps_per_period: int
     transient_periods: int
-    recorded_periods: int
     first_period: int
     more_rows: int
 
@@ -138,7 +146,8 @@ class Outcome(NamedTuple):
     section : array, shape (lanes, section points, states)
         States at the end of the last mesh periods.
     growth : array, shape (lanes, recorded periods) or (lanes, 0)
-        Logarithm of the growth of the tangent vector over each recorded period.
+        Logarithm of the growth of the tangent vector over each recorded period. In a frame, the
+        stretch of its direction; NaN from the first direction on that rounding hides.
     end_state, end_tangent : arrays, shape (lanes, states)
         Last state and tangent vector.
     status : array of `Status`, shape (lanes,)

@@ -46,6 +46,8 @@ class Scene:
         Whether a controller chooses an input of every lane.
     feedback : Feedback or None
         What the loop contains of the controller, see `control`.
+    traced : True or None
+        Whether the method follows forces and observed signals along every step.
     """
 
     model: Any
@@ -59,6 +61,7 @@ class Scene:
     jumps: Any = None
     control: Any = None
     feedback: Any = None
+    traced: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""
@@ -113,6 +116,12 @@ def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
         for name, value in vars(part).items():
             if not (value is None or value is True or is_dataclass(value)):
                 raise TypeError(f"{type(part).__qualname__}.{name}: is {value!r}, not True or None")
+    return _scene_type(scene)
+
+
+@cache
+def _scene_type(scene: Scene) -> SceneType:
+    """Return the Numba type of a scene, always the same one."""
     return SceneType(scene)
 
 

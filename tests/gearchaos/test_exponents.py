@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
+from gearchaos_kernels import LANES, Effects, Groups, Plan, integrate, jacobian
 from gearchaos_kernels.methods.rk4.stability import amplification
 
 from gearchaos.dynamics.exponents import (
@@ -70,6 +70,22 @@ def sum_error(scene, model, steps, resolved=True) -> float:
 )
 def test_sum_of_all_exponents_is_the_trace_whether_periodic_or_chaotic(scene, steps):
     assert sum_error(scene, pan2021(PERIODIC_AND_CHAOTIC), steps) < 1e-10
+
+
+def test_frames_of_the_kernels_are_those_of_a_decomposition_after_every_period(monkeypatch):
+    groups = pan2021(PERIODIC_AND_CHAOTIC)
+    found = exponents_of(NO_AXIAL, groups, 200, 8, 4)
+    # As for systems with more states than a block has lanes.
+    monkeypatch.setattr("gearchaos.dynamics.exponents.LANES", 1)
+    assert found.values == pytest.approx(
+        exponents_of(NO_AXIAL, groups, 200, 8, 4).values, abs=1e-12
+    )
+
+
+def test_a_frame_of_more_states_than_a_block_has_lanes_is_refused():
+    system = machines_of(34 * [random_machine(0, 17, 1)])
+    with pytest.raises(ValueError, match=f"34 states is larger than a block of {LANES}"):
+        integrate(system, np.zeros((34, 34)), Plan(8, 0, 1, 0, tangent=True, frame=True))
 
 
 def test_error_of_the_sum_falls_with_the_fourth_power_of_the_step():

@@ -158,12 +158,14 @@ def run(
     teeth: Teeth | None = None,
     first_period: int = 0,
     history: int = 0,
+    own: np.ndarray | None = None,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
     A start has all ten states, the outcome those of the scene. The tangent vector is on unless a
     test is about the plain loop: one compiled scene then serves many tests. Steps are plain ones
-    unless ``resolved`` splits those that cross a clearance, or is `FLOW_MAP`.
+    unless ``resolved`` splits those that cross a clearance, or is `FLOW_MAP`. ``own``: recorded
+    periods of every lane.
     """
     rest = np.zeros((model.load.size, len(STATES)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)
@@ -172,7 +174,8 @@ def run(
     plan = Plan(
         steps, transient, periods, points, tangent, bool(resolved), history, method, first_period
     )
-    return integrate(system_of(model, scene, physical, teeth), start[:, columns(scene)], plan)
+    system = system_of(model, scene, physical, teeth)
+    return integrate(system, start[:, columns(scene)], plan, periods=own)
 
 
 def assert_same_bits(one: Outcome, other: Outcome) -> None:

@@ -80,6 +80,25 @@ def test_any_order_of_lanes_gives_the_same_bits(integrate, whole):
     assert_same_bits(integrate(order), lanes_out_of(whole, order))
 
 
+@pytest.mark.parametrize("resolved", WAYS)
+def test_lanes_with_their_own_periods_have_the_bits_of_separate_calls(resolved):
+    how = {**HOW, "resolved": resolved}
+    own = np.resize([20, 5, 12, 1, 20], TOTAL)
+    together = run(MODEL, FULL, START, **how, own=own)
+    for periods in np.unique(own):
+        chosen = np.flatnonzero(own == periods)
+        points = min(HOW["points"], HOW["transient"] + periods)
+        alone = {**how, "periods": periods, "points": points}
+        separate = run(lanes_of(MODEL, chosen), FULL, START[chosen], **alone)
+        found = lanes_out_of(together, chosen)
+        sound = separate.status == 0
+        assert np.isnan(found.section[:, :-points][sound]).all()
+        assert not found.growth[sound, periods:].any()
+        section, growth = found.section[:, -points:], found.growth[:, :periods]
+        found = found._replace(section=section.copy(), growth=growth.copy())
+        assert_same_bits(found, separate)
+
+
 def test_a_second_run_gives_the_same_bits(integrate, whole):
     assert_same_bits(integrate(np.arange(TOTAL)), whole)
 

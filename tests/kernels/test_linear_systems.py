@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan, Status, integrate, jacobian
-from gearchaos_kernels.methods.flow_map import on_demand
+from gearchaos_kernels.methods.flow_map import on_demand, store
 from gearchaos_kernels.models.linear.system import LinearSystems
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,6 +24,14 @@ Among more machines with six elements there are some whose reference has 1e-10 o
 """
 
 PERIODS = 3
+WITH_LOADS = {
+    "transient_periods": 0,
+    "recorded_periods": PERIODS,
+    "section_points": PERIODS,
+    "tangent": True,
+    "contact": True,
+    "loads": True,
+}
 
 
 @cache
@@ -58,7 +66,7 @@ def test_the_order_is_4_where_elements_of_every_kind_cross(size):
     assert crossings.sum() >= 20
     errors, growth_errors = [], []
     for steps in (400, 1600):
-        plan = Plan(steps, 0, PERIODS, PERIODS, tangent=True, contact=True)
+        plan = Plan(steps, **WITH_LOADS)
         found = integrate(lanes_of(machines), start, plan)
         assert found.crossings.tolist() == crossings.tolist()
         errors.append(np.abs(found.section - section).max(axis=(1, 2)))
@@ -157,7 +165,7 @@ def test_flow_maps_are_exact_for_random_systems_with_and_without_springs_to_the_
 @pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)
 def test_flow_maps_are_exact_where_elements_of_every_kind_cross(size):
     machines, start, section, growth, crossings = exact(*size)
-    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
+    plan = Plan(60, **WITH_LOADS, method="flow_map")
     found = integrate(lanes_of(machines), start, plan)
     assert found.crossings.tolist() == crossings.tolist()
     assert found.section == pytest.approx(section, abs=1e-11)
@@ -165,9 +173,22 @@ def test_flow_maps_are_exact_where_elements_of_every_kind_cross(size):
 
 
 @pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)
+def test_flow_maps_record_the_loads_of_fine_steps_where_dampers_act_in_contact(size):
+    machines, start, _, _, _ = exact(*size)
+    system = lanes_of(machines)
+    wanted = integrate(system, start, Plan(12800, **WITH_LOADS)).loads
+    found = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map")).loads
+    size = np.abs(wanted[..., :2]).max(axis=2)
+    assert (np.abs(found[..., :2] - wanted[..., :2]).max(axis=2) <= 1e-8 * size).all()
+    # A jump of a force within a step is the error of the fine steps.
+    assert (np.abs(found[..., 2] - wanted[..., 2]) <= 1e-5 * size).all()
+    assert (np.abs(found[..., 3] - wanted[..., 3]) <= 1e-5 * size**2).all()
+
+
+@pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)
 def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(size):
     machines, start, _, _, _ = exact(*size)
-    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
+    plan = Plan(60, **WITH_LOADS, method="flow_map")
     # The same maps for many lanes, which move eight at a time, and for one.
     system = lanes_of(machines[:1] * 9)
     starts = start[0] * np.linspace(0.5, 1.0, 9)[:, np.newaxis]
@@ -176,6 +197,26 @@ def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(size):
         alone = integrate(system.of([lane]), starts[lane : lane + 1], plan)
         assert np.array_equal(alone.section[0], together.section[lane])
         assert np.array_equal(alone.growth[0], together.growth[lane])
+        assert np.array_equal(alone.loads[0], together.loads[lane])
+
+
+@pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)
+def test_maps_of_scenes_with_loads_and_without_are_kept_apart(size, monkeypatch):
+    machines, start, _, _, _ = exact(*size)
+    system, with_loads = lanes_of(machines), Plan(60, **WITH_LOADS, method="flow_map")
+    plans = with_loads._replace(loads=False), with_loads
+
+    def forget_maps():
+        for module in (store, on_demand):
+            monkeypatch.setattr(module, "_kept", module._Kept(0))
+
+    wanted = []
+    for plan in plans:
+        forget_maps()
+        wanted.append(integrate(system, start, plan))
+    forget_maps()
+    for number in (0, 1, 0):
+        assert_same_bits(integrate(system, start, plans[number]), wanted[number])
 
 
 def test_flow_maps_refuse_more_elements_than_a_number_can_list():
@@ -227,6 +268,37 @@ def test_maps_made_on_demand_give_the_same_bits_on_any_threads(crowd, monkeypatc
         assert_same_bits(integrate(system, start, plan), whole)
     finally:
         numba.set_num_threads(before)
+
+
+def test_maps_made_on_demand_serve_lanes_with_their_own_periods(crowd):
+    system, start, plan, _ = crowd
+    own = np.resize([1, 3, 2, 3, 1], system.lanes)
+    together = integrate(system, start, plan, periods=own)
+    for periods in (1, 2, 3):
+        chosen = np.flatnonzero(own == periods)
+        shorter = plan._replace(recorded_periods=periods, section_points=periods)
+        separate = integrate(system.of(chosen), start[chosen], shorter)
+        found = lanes_out_of(together, chosen)
+        section, growth = found.section[:, -periods:].copy(), found.growth[:, :periods].copy()
+        assert_same_bits(found._replace(section=section, growth=growth), separate)
+
+
+@pytest.mark.parametrize("map_bytes", [0, 2**27])
+def test_maps_made_on_demand_carry_frames(crowd, monkeypatch, map_bytes):
+    system, start, plan, _ = crowd
+    chosen, states = [0, 1, 2, 3, 4, 6, 7], 10
+    lanes, starts = system.of(chosen).repeated(states), np.repeat(start[chosen], states, axis=0)
+    vectors = np.tile(np.eye(states), (len(chosen), 1))
+    monkeypatch.setattr(on_demand, "_kept", on_demand._Kept(0))
+    framed = plan._replace(frame=True, map_bytes=map_bytes)
+    found = integrate(lanes, starts, framed, tangent_start=vectors)
+    growth = found.growth.reshape(len(chosen), states, PERIODS)
+    single = integrate(lanes, starts, plan, tangent_start=vectors)
+    assert np.array_equal(found.section, single.section)
+    assert growth[:, 0] == pytest.approx(single.growth[::states], abs=1e-12)
+    columns = single.end_tangent * np.exp(single.growth.sum(axis=1))[:, np.newaxis]
+    volume = np.linalg.slogdet(columns.reshape(-1, states, states)).logabsdet
+    assert growth.sum(axis=(1, 2)) == pytest.approx(volume, abs=1e-9)
 
 
 def test_maps_that_no_steps_suffice_for_stop_their_lanes_only(crowd):

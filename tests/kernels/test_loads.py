@@ -85,7 +85,36 @@ def test_loads_and_contact_change_nothing_else_and_plain_steps_have_loads_too():
     assert plain.loads[0, FORCE] == pytest.approx(with_loads.loads[0, FORCE], rel=1e-6)
 
 
-def test_flow_maps_report_them_as_well_as_200_runge_kutta_steps():
+def test_flow_maps_follow_a_swinging_mass_at_any_phase_of_their_steps():
+    amplitude, periods = 0.7, 8
+    system, rate = swinging()
+    plan = Plan(12, 0, periods, 1, tangent=True, loads=True, method=FLOW_MAP)
+    # The crest of a cosine lies within a step, wherever the motion starts.
+    for phase in (0.0, 0.1, 1.0):
+        start = state(
+            delta_5=amplitude * np.cos(phase), delta_5_rate=-amplitude * rate * np.sin(phase)
+        )[np.newaxis]
+        (loads,) = integrate(system, start, plan).loads
+        for signal in (FORCE, ERROR):
+            extremes = loads[signal, [LARGEST, SMALLEST]]
+            # The bearings move by a billionth of it.
+            assert extremes == pytest.approx([amplitude, -amplitude], rel=2e-9)
+            assert loads[signal, SQUARE] == pytest.approx(amplitude**2 / 2.0, rel=4e-9)
+            assert loads[signal, MEAN] == pytest.approx(0.0, abs=2e-9)
+
+
+def test_flow_maps_record_the_loads_of_very_fine_steps():
+    system, start = system_of(MODEL), np.zeros((4, 10))
+    wanted = integrate(system, start, PLAN._replace(steps_per_period=12800)).loads
+    exact = integrate(system, start, PLAN._replace(steps_per_period=12, method=FLOW_MAP)).loads
+    size = np.abs(wanted[..., :2]).max(axis=2)
+    # The fine steps themselves are right to 2e-11, and their means at kinks to 3e-10.
+    assert np.abs(exact[..., :2] - wanted[..., :2]).max(axis=2) == pytest.approx(0.0, abs=1e-10)
+    assert (np.abs(exact[..., MEAN] - wanted[..., MEAN]) <= 1e-9 * size).all()
+    assert exact[..., SQUARE] == pytest.approx(wanted[..., SQUARE], rel=1e-9)
+
+
+def test_flow_maps_sample_states_as_well_as_200_runge_kutta_steps():
     system, start = system_of(MODEL), np.zeros((4, 10))
     fine = integrate(system, start, PLAN._replace(steps_per_period=3200))
     # With extremes of a state: other tests have compiled this loop.

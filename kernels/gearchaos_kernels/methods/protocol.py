@@ -58,11 +58,15 @@ class Method:
         Frozen dataclass without fields that identifies the method in a scene.
     always_resolved : bool
         Whether the method resolves every crossing, also where the plan has plain steps.
+    traces : bool
+        Whether the method follows forces and observed signals along every step by itself, and
+        accumulates them in the rows `recorders.loads.accumulated_of`.
     rows : callable
         ``rows(scene)``: rows of a block that the method uses for itself.
     prepare : callable
-        ``prepare(system, plan, scene)`` yields every `Share` in which lanes are integrated. It
-        raises ValueError if the method cannot integrate the system.
+        ``prepare(system, plan, scene, periods)`` yields every `Share` in which lanes are
+        integrated; ``periods`` (lanes,): their recorded periods. It raises ValueError if the method
+        cannot integrate the system.
     memory : callable
         ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
         (lanes,): steps per period with which the default method is stable.
@@ -99,8 +103,9 @@ class Method:
     name: str
     flags: Any
     always_resolved: bool
+    traces: bool
     rows: Callable[[Scene], int]
-    prepare: Callable[[Any, Plan, Scene], Iterator[Share]]
+    prepare: Callable[[Any, Plan, Scene, Integers], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]
     sharing: Callable[[Any], Integers]
     work: Callable[[Any, Plan, NDArray[np.int64]], float]
@@ -170,16 +175,45 @@ resolve = Interface("method", "resolve")
 grids_of = Interface("method", "grids")
 
 
-def cut(counts: Integers, steps: Integers, maps_at: Integers) -> Integers:
+def cut(counts: Integers, steps: Integers, maps_at: Integers, size: int = LANES) -> Integers:
     """Cut groups of lanes into blocks, shape (blocks, 4); see `Share`.
 
     ``counts``: lanes of each group; ``steps``: its steps per period; ``maps_at``: where its maps
-    begin.
+    begin; ``size``: lanes of a block.
     """
     first = np.cumsum(counts) - counts
     blocks = [
-        (begin + at, min(LANES, count - at), number, place)
+        (begin + at, min(size, count - at), number, place)
         for begin, count, number, place in zip(first, counts, steps, maps_at, strict=True)
-        for at in range(0, count, LANES)
+        for at in range(0, count, size)
     ]
     return np.array(blocks, dtype=np.intp).reshape(-1, 4)
+
+
+def with_periods(share: Share, periods: Integers, together: int = 1) -> Share:
+    """Return a share whose blocks also have their recorded periods, in their fifth column.
+
+    ``periods``: recorded periods of every lane of the batch, (lanes,). Lanes of a block then have
+    equally many. ``together``: number of lanes that are not divided among blocks. Blocks that can
+    continue already fulfil both, and keep their lanes.
+    """
+    if share.progress.size or (together == 1 and (periods == periods[:1]).all()):
+        blocks = np.empty((len(share.blocks), share.blocks.shape[1] + 1), dtype=np.intp)
+        blocks[:, :4], blocks[:, 5:] = share.blocks[:, :4], share.blocks[:, 4:]
+        blocks[:, 4] = periods[share.order[share.blocks[:, 0]]]
+        return share._replace(blocks=blocks)
+    steps, maps_at = np.repeat(share.blocks[:, 2:], share.blocks[:, 1], axis=0).T
+    own = periods[share.order]
+    sorting = np.lexsort((own, maps_at))
+    steps, maps_at, own = steps[sorting], maps_at[sorting], own[sorting]
+    begins = np.flatnonzero(np.diff(own, prepend=-1) | np.diff(maps_at, prepend=-1))
+    counts = np.diff(begins, append=own.size)
+    size = whole_groups(together)
+    blocks = cut(counts, steps[begins], maps_at[begins], size)
+    length = np.repeat(own[begins], -(-counts // size))
+    return share._replace(order=share.order[sorting], blocks=np.column_stack([blocks, length]))
+
+
+def whole_groups(together: int) -> int:
+    """Return the lanes of a full block; ``together``: number of lanes that are not divided."""
+    return LANES // together * together

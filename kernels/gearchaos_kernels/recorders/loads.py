@@ -6,6 +6,8 @@ both ends. Integrals follow by Simpson's rule, extremes from the parabola throug
 If a contact begins or ends within a step, the force has a kink there. The parabola is then not
 used. Instead the force at the kink, which is that of the damper alone, is a fourth value.
 
+A method that follows the signals along its steps (``traced``) accumulates them by itself.
+
 The rows are: the signals and the slopes of the forces at the end of the last step; then for each
 signal its maximum, its minimum, and the sums over the steps of six times the mean of itself and of
 its square.
@@ -60,6 +62,12 @@ def signals_of(scene: Scene) -> int:
 def rows(scene: Scene) -> int:
     """Return the number of rows of a scene."""
     return signals_of(scene) * (1 + SIGNAL_ROWS) + elements_of(scene)
+
+
+def accumulated_of(scene: Scene) -> int:
+    """Return the first row of what is accumulated of the first signal."""
+    first: int = provider_of(scene.recorders).first_row("loads", scene)
+    return first + signals_of(scene) + elements_of(scene)
 
 
 class Offsets(NamedTuple):
@@ -141,6 +149,13 @@ def begin_signal(memory, first, slot, number, value):
 @scalar
 def step(memory, first_row, block, clock, records, scene):
     """Update the record of every slot after a step."""
+    if scene.traced is None:
+        sample_step(memory, first_row, clock, records, scene)
+
+
+@scalar
+def sample_step(memory, first_row, clock, records, scene):
+    """Update the record of every slot from three values of a step."""
     if clock.recorded >= 0:
         start, middle, end = grids_of(clock, records.steps, scene)
         for slot in range(LANES):
@@ -206,6 +221,13 @@ def add_step(memory, first_row, slot, number, first, half, last, smooth):
 @scalar
 def crossing(memory, first_row, slot, crossing, lane, scene):
     """Record the force of an element at a crossing, where the damper alone acts."""
+    if scene.traced is None:
+        sample_kink(memory, first_row, slot, crossing, lane, scene)
+
+
+@scalar
+def sample_kink(memory, first_row, slot, crossing, lane, scene):
+    """Record the force of a damper that acts alone as a value of its element."""
     elements = elements_at(lane, unforced(lane, scene), scene)
     force = elements[crossing.element].damping * crossing.closing
     row = (first_row + offsets(scene).accumulated + SIGNAL_ROWS * crossing.element) * STRIDE + slot
@@ -225,7 +247,7 @@ def finish(memory, first_row, lane_at, clock, records, scene):
 
 LOADS = Recorder(
     name="loads",
-    wanted=lambda plan, _resolved: plan.records_steps,
+    wanted=lambda plan, _resolved: plan.loads or plan.records_steps,
     rows=rows,
     reads_before=True,
     begin=begin,

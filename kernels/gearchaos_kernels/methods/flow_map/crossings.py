@@ -18,7 +18,7 @@ from gearchaos_kernels.contact.branches import (
     leave,
     next_branch_of,
 )
-from gearchaos_kernels.contact.leaving import may_leave
+from gearchaos_kernels.contact.leaving import NEVER, may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
 from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.methods.flow_map import vectors
@@ -26,6 +26,7 @@ from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, 
 from gearchaos_kernels.methods.flow_map.moments import find_moments
 from gearchaos_kernels.methods.flow_map.sets import KNOWN, enter, find_maps, report
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
+from gearchaos_kernels.methods.flow_map.tracing import accumulated_rows, trace_piece
 from gearchaos_kernels.models.protocol import Gap
 
 
@@ -58,6 +59,9 @@ def cross_together(memory, slots, at, given, scene):
         vectors.compute_gaps(aside, 0, maps, maps_at, scene)
         for element in range(place.elements):
             find_moments(aside, element, lanes, scene)
+        if scene.traced is not None:
+            if at.recorded:
+                trace_to_crossing(aside, maps, maps_at, scene)
         cross_over(aside, scene)
         if place.on_demand:
             find_maps_of(aside, slots, given, scene)
@@ -68,6 +72,9 @@ def cross_together(memory, slots, at, given, scene):
         vectors.bound_bends(aside, 0, maps, maps_at, scene)
         vectors.move(aside, 0, maps, maps_at, scene)
         left = count_left(aside, lanes, maps, maps_at, scene)
+    if scene.traced is not None:
+        if at.recorded:
+            trace_to_end(memory, slots, aside, maps, maps_at, scene)
     for n in range(lanes):
         copy_rows(aside, n, memory, slots[n], STATE, place.states)
         if scene.tangent is not None:
@@ -94,6 +101,32 @@ def share_maps(aside, lanes, scene):
     first = method_rows(scene).maps * STRIDE
     for n in range(lanes, VECTOR):
         aside[first + n] = aside[first]
+
+
+@scalar
+def trace_to_crossing(aside, maps, maps_at, scene):
+    """Accumulate the signals of eight lanes from the last crossing of each to the next one."""
+    place, at_rows, first = layout(scene), aside_rows(scene), method_rows(scene).piece
+    for n in range(VECTOR):
+        after, moment = aside[at_rows.after * STRIDE + n], NEVER
+        for element in range(place.elements):
+            row = at_rows.gaps + element * at_rows.gap_rows + at_rows.moment
+            moment = min(moment, aside[row * STRIDE + n])
+        aside[first * STRIDE + n] = after
+        aside[(first + 1) * STRIDE + n] = moment if moment <= 1.0 else after
+    trace_piece(aside, 0, maps, maps_at, scene)
+
+
+@scalar
+def trace_to_end(memory, slots, aside, maps, maps_at, scene):
+    """Accumulate the signals from the last crossing to the end of the step; store all of them."""
+    first, accumulated = method_rows(scene).piece, accumulated_rows(scene)
+    for n in range(VECTOR):
+        aside[first * STRIDE + n] = aside[aside_rows(scene).after * STRIDE + n]
+        aside[(first + 1) * STRIDE + n] = 1.0
+    trace_piece(aside, 0, maps, maps_at, scene)
+    for n in range(slots.shape[0]):
+        copy_rows(aside, n, memory, slots[n], accumulated.first, accumulated.size)
 
 
 @scalar

@@ -1,15 +1,18 @@
 """Where numbers are stored: flow maps in their table, lanes that cross in memory aside."""
 
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import CACHE_LINE
 from gearchaos_kernels.memory.block_memory import numbers_of
 from gearchaos_kernels.memory.rows import constants, rows_of
 from gearchaos_kernels.plan import Floats
+from gearchaos_kernels.recorders.loads import signals_of
 from gearchaos_kernels.scene import Scene, provider_of
 
 TERMS = 16
@@ -70,7 +73,10 @@ class Layout(NamedTuple):
     gap, switch, damper : int
         Where the gaps, the switch terms of springs, and those of dampers that act in contact only
         begin within the maps of a set of branches; the map of the state comes first. Without such
-        dampers, ``damper`` equals ``size``.
+        dampers, ``damper`` equals ``signal``.
+    signal, signals : int
+        Where the polynomials of the signals begin within the maps of a set of branches, and their
+        number: forces and observed signals in a scene that traces them, otherwise 0.
     size, step_size : int
         Size of the maps of one set of branches, and of all numbers of a step.
     waves, bounds, bound_size, header : int
@@ -92,6 +98,8 @@ class Layout(NamedTuple):
     gap: int
     switch: int
     damper: int
+    signal: int
+    signals: int
     size: int
     step_size: int
     waves: int
@@ -123,7 +131,9 @@ def layout_of(scene: Scene) -> Layout:
     gap = columns * width
     switch = gap + elements * columns * TERMS
     damper = switch + elements * TERMS * width
-    size = damper + (elements * TERMS * width if scene.jumps else 0)
+    signal = damper + (elements * TERMS * width if scene.jumps else 0)
+    signals = signals_of(scene) if scene.traced else 0
+    size = signal + signals * columns * TERMS
     sets = 2**elements if scene.resolved else 1
     on_demand = int(sets > MOST_SETS_IN_ADVANCE)
     branches = 1 if on_demand else sets
@@ -144,6 +154,8 @@ def layout_of(scene: Scene) -> Layout:
         gap=gap,
         switch=switch,
         damper=damper,
+        signal=signal,
+        signals=signals,
         size=size,
         step_size=header + branches * size,
         waves=waves,
@@ -161,6 +173,17 @@ layout = constants(layout_of)
 
 waves_at = numbers_of(lambda scene: layout_of(scene).waves)
 """Read the values of the waves; arguments: array, place of the first one, scene."""
+
+
+@intrinsic
+def no_waves(_typing_context: Any, scene: Any) -> Any:
+    """Return values of 0 for all waves, a tuple."""
+    returned = types.UniTuple(types.float64, layout_of(scene.scene).waves)
+
+    def generate(context: Any, _builder: Any, _signature: Any, _arguments: Any) -> Any:
+        return context.get_constant_null(returned)
+
+    return returned(scene), generate
 
 
 class LastCrossing(NamedTuple):
@@ -288,24 +311,44 @@ class MethodRows(NamedTuple):
     maps : int
         Where the maps of the lane's branches begin, relative to the first ones of its block; only
         if maps are made on demand.
+    means : int
+        Constant parts of the signals, which have no column in the maps.
+    terms : int
+        `TERMS` rows of a signal along the step.
+    piece : int
+        The moments at which a smooth piece of the signals begins and ends.
+    total : int
+        Number of rows, counted from ``inputs``.
     """
 
     inputs: int
     margins: int
     maps: int
+    means: int
+    terms: int
+    piece: int
+    total: int
 
 
 def method_rows_of(scene: Scene) -> MethodRows:
     """Return the rows that flow maps use in a block."""
-    place, first = layout_of(scene), rows_of(scene).method
+    return _method_rows(layout_of(scene), rows_of(scene).method)
+
+
+def _method_rows(place: Layout, first: int) -> MethodRows:
+    """Return the rows that flow maps use, from a first one on."""
     margins = first + place.columns - place.states
-    return MethodRows(first, margins, margins + place.elements)
+    maps = margins + place.elements
+    means = maps + place.on_demand
+    terms = means + place.signals
+    piece = terms + (TERMS if place.signals else 0)
+    end = piece + (2 if place.signals else 0)
+    return MethodRows(first, margins, maps, means, terms, piece, end - first)
 
 
 def rows_needed(scene: Scene) -> int:
     """Return the number of rows that flow maps use in a block."""
-    place = layout_of(scene)
-    return place.columns - place.states + place.elements + place.on_demand
+    return _method_rows(layout_of(scene), 0).total
 
 
 method_rows = constants(method_rows_of)

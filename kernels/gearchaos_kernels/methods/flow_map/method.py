@@ -27,7 +27,8 @@ from gearchaos_kernels.methods.flow_map.store import (
     sharing,
     work,
 )
-from gearchaos_kernels.methods.protocol import Method, Share, cut
+from gearchaos_kernels.methods.flow_map.tracing import trace_block
+from gearchaos_kernels.methods.protocol import Integers, Method, Share, cut
 from gearchaos_kernels.models.interfaces import grid_within
 from gearchaos_kernels.plan import Plan
 from gearchaos_kernels.scene import Scene, implement
@@ -38,17 +39,20 @@ class FlowMap:
     """Identifies flow maps in a scene; they have no flags."""
 
 
-def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
+def prepare(system: Any, plan: Plan, scene: Scene, periods: Integers) -> Iterator[Share]:
     """Yield shares of lanes, lanes with the same maps together, as many as have maps that fit."""
     refusal = system.refuses_maps()
     if refusal:
         raise ValueError(refusal)
     if layout_of(scene).on_demand:
-        yield from shares_on_demand(system, plan, scene)
+        yield from shares_on_demand(system, plan, scene, periods)
         return
     lanes, steps, group = system.lanes, fewest_steps(plan), sharing(system)
-    in_groups = np.argsort(group, kind="stable")
-    _, first, counts = np.unique(group[in_groups], return_index=True, return_counts=True)
+    if group.any() or not lanes:
+        in_groups = np.argsort(group, kind="stable")
+        _, first, counts = np.unique(group[in_groups], return_index=True, return_counts=True)
+    else:
+        in_groups, first, counts = np.arange(lanes), np.zeros(1, np.intp), np.array([lanes])
     done = 0
     while done < first.size:
         maps, places = maps_of(system.of(in_groups[first[done:]]), steps, scene, plan.map_bytes)
@@ -80,7 +84,11 @@ def step(memory, lanes, at, given, scene):
     """Take one step in every slot; return how many lanes may have left a contact branch."""
     # A single lane is faster along its state.
     slots = 1 if lanes == 1 else slots_of(lanes)
-    return move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
+    suspects = move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
+    if scene.traced is not None:
+        if at.recorded:
+            trace_block(memory, slots, given.maps, at.maps_at, scene)
+    return suspects
 
 
 @scalar
@@ -97,6 +105,7 @@ FLOW_MAP = Method(
     name="flow_map",
     flags=FlowMap,
     always_resolved=True,
+    traces=True,
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.memory.rows import LANES, STRIDE, rows_of
+from gearchaos_kernels.memory.rows import STRIDE, rows_of
 from gearchaos_kernels.methods.flow_map.layout import layout_of
 from gearchaos_kernels.methods.flow_map.sets import KNOWN
 from gearchaos_kernels.methods.flow_map.store import (
@@ -24,8 +24,9 @@ from gearchaos_kernels.methods.flow_map.store import (
     fewest_steps,
     make_tables,
     sharing,
+    which_maps,
 )
-from gearchaos_kernels.methods.protocol import Integers, Share, cut
+from gearchaos_kernels.methods.protocol import Integers, Share, cut, whole_groups
 from gearchaos_kernels.plan import MAP_BYTES, Floats, Plan
 from gearchaos_kernels.scene import Scene
 from gearchaos_kernels.turns import in_turn
@@ -59,6 +60,8 @@ class _Group:
         The set for which each lane has stopped, `KNOWN` for none.
     progress : array, shape (blocks, numbers)
         See `Share`.
+    full : int
+        Number of lanes of a full block.
     """
 
     lanes: Integers
@@ -66,28 +69,31 @@ class _Group:
     sets: tuple[int, ...]
     lacked: Integers
     progress: Floats
+    full: int
 
     @classmethod
-    def at_start(cls, lanes: Integers, steps: int, rows: int) -> "_Group":
+    def at_start(cls, lanes: Integers, steps: int, rows: int, full: int) -> "_Group":
         """Return a group of lanes at tau = 0; ``rows``: number of rows of a block."""
-        progress = np.zeros((-(-lanes.size // LANES), 1 + rows * STRIDE))
-        return cls(lanes, steps, _ENGAGED, np.full(lanes.size, KNOWN), progress)
+        progress = np.zeros((-(-lanes.size // full), 1 + rows * STRIDE))
+        return cls(lanes, steps, _ENGAGED, np.full(lanes.size, KNOWN), progress, full)
 
     def again(self, chosen: NDArray[np.bool_]) -> "_Group":
         """Return the group of some of its lanes at tau = 0, the same group if it is all of them."""
         if chosen.all():
             return self
         rows = self.progress.shape[1] // STRIDE
-        return replace(self.at_start(self.lanes[chosen], self.steps, rows), sets=self.sets)
+        some = self.at_start(self.lanes[chosen], self.steps, rows, self.full)
+        return replace(some, sets=self.sets)
 
     def stopped(self, lacked: Integers, progress: Floats) -> "_Group":
         """Return the blocks that have stopped, which need the sets ``lacked`` (lanes,)."""
         sets = sorted({*self.sets, *lacked.tolist()} - {KNOWN})
-        block = np.arange(lacked.size) // LANES
+        block = np.arange(lacked.size) // self.full
         left = np.bincount(block, lacked != KNOWN) > 0
         # All blocks but the last one are full, so those that are left keep their lanes.
         lanes = self.lanes[left[block]]
-        return _Group(lanes, self.steps, tuple(sets), lacked[left[block]], progress[left])
+        kept = lacked[left[block]], progress[left]
+        return _Group(lanes, self.steps, tuple(sets), *kept, self.full)
 
     def size(self, scene: Scene) -> int:
         """Return the size of the maps that its lanes will probably need, in numbers."""
@@ -95,10 +101,15 @@ class _Group:
         return sets * self.steps * layout_of(scene).step_size
 
 
-def shares_on_demand(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
-    """Yield shares of lanes until none of them has stopped for lack of maps."""
+def shares_on_demand(system: Any, plan: Plan, scene: Scene, periods: Integers) -> Iterator[Share]:
+    """Yield shares of lanes until none of them has stopped for lack of maps.
+
+    ``periods`` (lanes,): their recorded periods. Lanes of a group have equally many.
+    """
     steps, rows = fewest_steps(plan), rows_of(scene).total + plan.more_rows
-    waiting = deque(_Group.at_start(lanes, steps, rows) for lanes in _sharing_lanes(system))
+    full = whole_groups(plan.lanes_together(len(system.states)))
+    together = _lanes_together(system, periods, full)
+    waiting = deque(_Group.at_start(lanes, steps, rows, full) for lanes in together)
     steps_of = np.full(system.lanes, steps)
     while waiting:
         groups = _as_many_as_fit(waiting, plan.map_bytes, scene)
@@ -108,7 +119,7 @@ def shares_on_demand(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
             slow, moving = _by_convergence(group, found)
             if slow.size:
                 if 2 * group.steps <= max(steps, MOST_MAP_STEPS):
-                    waiting.appendleft(_Group.at_start(slow, 2 * group.steps, rows))
+                    waiting.appendleft(_Group.at_start(slow, 2 * group.steps, rows, full))
                 else:
                     yield _without_maps(slow, steps, steps_of, scene)
             if moving.lanes.size:
@@ -120,12 +131,16 @@ def shares_on_demand(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
             waiting.extendleft(_stopped([group for group, _ in ready], share))
 
 
-def _sharing_lanes(system: Any) -> list[Integers]:
-    """Return the numbers of the lanes that share their maps, up to `MOST_BLOCKS` blocks of them."""
-    numbers = sharing(system)
+def _lanes_together(system: Any, periods: Integers, full: int) -> list[Integers]:
+    """Return the numbers of lanes with the same maps and periods, up to `MOST_BLOCKS` full blocks.
+
+    ``periods`` (lanes,): recorded periods; ``full``: number of lanes of a full block.
+    """
+    pairs = np.stack([sharing(system), periods], axis=1)
+    numbers = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1)
     in_groups = np.argsort(numbers, kind="stable")
     _, first = np.unique(numbers[in_groups], return_index=True)
-    most = MOST_BLOCKS * LANES
+    most = MOST_BLOCKS * full
     return [
         lanes[at : at + most]
         for lanes in np.split(in_groups, first[1:])
@@ -169,7 +184,7 @@ def _share_of(ready: list[tuple[_Group, Places]], table: Floats, steps_of: Integ
     counts = np.array([group.lanes.size for group, _ in ready])
     steps = np.array([group.steps for group, _ in ready])
     places = np.array([found[0] for _, found in ready])
-    blocks = cut(counts, steps, places)
+    blocks = cut(counts, steps, places, ready[0][0].full)
     of_block = np.searchsorted(np.cumsum(counts), blocks[:, 0], side="right")
     known = np.full((len(ready), 2 * max(len(found) for _, found in ready)), KNOWN)
     for row, (_, found) in zip(known, ready, strict=True):
@@ -228,7 +243,8 @@ def _sets_of(
     global _kept
     scene, place = scene.bare(), layout_of(scene)
     rows = system.of([group.lanes[0] for group in groups]).map_parameters()
-    scene_name = type(scene.model), scene.model, scene.resolved, steps, system.map_constants()
+    model = type(scene.model), scene.model
+    scene_name = *model, *which_maps(scene), steps, system.map_constants()
     names = [(scene_name, row.tobytes(), g.steps) for row, g in zip(rows, groups, strict=True)]
     needed = [(name, g, number) for name, g in zip(names, groups, strict=True) for number in g.sets]
     new = [one for one in needed if one[2] not in _kept.places.get(one[0], {})]

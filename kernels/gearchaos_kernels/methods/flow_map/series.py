@@ -21,6 +21,12 @@ from gearchaos_kernels.memory.block_memory import (
 from gearchaos_kernels.memory.rows import STATE, STRIDE, State, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map.layout import TERMS, fourth_derivative, layout, waves_at
+from gearchaos_kernels.methods.flow_map.signals import (
+    add_dampers,
+    differentiate_signals,
+    observed_series,
+    write_signals,
+)
 from gearchaos_kernels.models.interfaces import (
     accelerations,
     elements_at,
@@ -70,7 +76,7 @@ _ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
 
 
 @evaluator
-def differentiate(coefficients, matrices, dampers, scene):
+def differentiate(coefficients, matrices, dampers, traced, scene):
     """Apply the formulas of a model to unit vectors, lane by lane, and write the matrices.
 
     ``matrices`` has the shape (lanes, states + elements, states + 1 + waves + elements). Its rows
@@ -78,7 +84,7 @@ def differentiate(coefficients, matrices, dampers, scene):
     the states, the drive, the waves, and a unit force of each element times its relative stiffness.
     ``dampers`` (lanes, elements, states + 1 + waves + 1) receives the forces of those dampers that
     act in contact only, which are not in the rates, as multiples of the last columns; its own last
-    column is their force at unit rate.
+    column is their force at unit rate. ``traced``: see `signals.differentiate_signals`.
     """
     memory = aligned_memory(rows(scene).total)
     place = layout(scene)
@@ -97,6 +103,10 @@ def differentiate(coefficients, matrices, dampers, scene):
             elements, shares = elements_at(lane, acting, scene), mobility_forces(lane, scene)
             units = numbers_of_elements(unit, forced, scene)
             pushes = each(unit_push, gaps, elements, kinds(scene), shares, units)
+            if scene.traced is not None:
+                waves = waves_at(unit, states + 1, scene)
+                of_lane = traced[0][number], traced[1][number]
+                differentiate_signals(state, lane, acting, waves, of_lane, column, scene)
             change = accelerations(state, pushes, acting, lane, scene)
             write_state(memory, STATE, 0, State(state.rate, change), scene)
             for line in range(states):
@@ -123,25 +133,26 @@ def make_maps(matrices, elements_on, inputs, forcing, tables, tails, place):
     """Compute the maps of lanes and their truncation errors; all scenes share the compiled code.
 
     ``tables`` (lanes, steps, size of a step) and ``tails`` (lanes,) are written. ``matrices``: see
-    `differentiate`; ``elements_on``: its ``dampers``, and the stiffness of the elements as
-    `Model.stiffness` returns it; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`,
-    steps): Taylor coefficients of the stiffness variation and of the waves about the middle of
-    every step; ``place``: the `Layout`. ``elements_on`` begins with the sets of branches: whether
-    each element is engaged, 1 or 0, shape (lanes, sets in a step, elements).
+    `differentiate`; ``elements_on``: the sets of branches, given by whether each element is
+    engaged, 1 or 0, shape (lanes, sets in a step, elements); then ``dampers``, the stiffness of the
+    elements as `Model.stiffness` returns it, and both arrays of ``traced``; ``inputs``: see
+    `MapFormulas`; ``forcing`` (1 + waves, `ORDER`, steps): Taylor coefficients of the stiffness
+    variation and of the waves about the middle of every step; ``place``: the `Layout`.
     """
-    engaged, dampers, stiffness = elements_on
+    engaged, dampers, stiffness, observed, forces = elements_on
     for number in prange(tables.shape[0]):
         # The index of a parallel loop has another type; without the cast, two versions of
         # `fill_maps` are compiled.
         lane = np.int64(number)
-        of_lane = engaged[lane], dampers[lane], stiffness[lane]
+        of_set = engaged[lane], dampers[lane], stiffness[lane]
+        of_lane = *of_set, observed[lane], forces[lane]
         tails[lane] = fill_maps(matrices[lane], of_lane, inputs, forcing, tables[lane], place)
 
 
 @part
 def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
-    sets, dampers, stiffness = elements_on
+    sets, dampers, stiffness, observed, forces = elements_on
     tail = 0.0
     for number in range(place.branches):
         engaged = sets[number]
@@ -150,7 +161,7 @@ def fill_maps(matrix, elements_on, inputs, forcing, table, place):
             some = table[first : first + TOGETHER]
             near = forcing[:, :, first : first + TOGETHER].copy()
             springs = spring_series(stiffness, near)
-            on_branches = engaged, springs, dampers[:, -1]
+            on_branches = engaged, springs, dampers[:, -1], observed, forces
             begin = place.header + number * place.size
             lost = fill_steps(damped, on_branches, inputs, near, (some, begin), place)
             tail = np.maximum(tail, lost)
@@ -193,19 +204,20 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     """Write the maps of some steps on one set of branches; return the truncation error.
 
     ``on_branches``: for each element whether it is engaged, the series of its stiffness, and its
-    damping if that acts in contact only. ``target``: the table of the steps, and where the maps
-    begin in each of them. The last axis of every array runs over these steps. Arrays are written in
-    loops, because for a slice Numba also compiles a check of the shapes.
+    damping if that acts in contact only, then both arrays of ``traced``. ``target``: the table of
+    the steps, and where the maps begin in each of them. The last axis of every array runs over
+    these steps. Arrays are written in loops, because for a slice Numba also compiles a check of the
+    shapes.
     """
     states, columns, elements = place.states, place.columns, place.elements
-    engaged, springs, damping = on_branches
+    engaged, springs, damping, observed, forces = on_branches
     width = springs.shape[2]
     functions = 1 + place.waves
     rates = matrix[:states, : states + functions].copy()
     gaps = matrix[states:, : states + functions].copy()
     mobility = matrix[:states, states + functions :].copy()
     acting = engaged, springs
-    psi, gap = motion_series((rates, mobility, gaps), acting, inputs, forcing, place)
+    psi, gap, pulled = motion_series((rates, mobility, gaps), acting, inputs, forcing, place)
     backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
     inverse, moved, switch = inverse_series(backward, acting, place)
 
@@ -221,7 +233,16 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
         tail = np.maximum(tail, left)
     write_maps(end, along, traced, target, place)
-    if place.damper < place.size:
+    if place.signals > 0:
+        kept, _ = economised(pulled)
+        kept = multiplied(kept.reshape((TERMS * elements, columns, width)), from_beginning)
+        add_dampers(kept, along, engaged, forces)
+        write_signals(kept, 0, target, place)
+        kept, _ = economised(observed_series(psi, observed, ORDER))
+        seen = observed.shape[0]
+        kept = multiplied(kept.reshape((TERMS * seen, columns, width)), from_beginning)
+        write_signals(kept, elements, target, place)
+    if place.damper < place.signal:
         kept, lost = economised(moved)
         kept = multiplied(kept.reshape((TERMS * elements, states, width)), first)
         write_dampers(kept, damping, target, place)
@@ -233,8 +254,8 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
 def motion_series(matrices, acting, inputs, forcing, place):
     """Return the series of the motion and of the gaps about the middle of some steps, by column.
 
-    Shapes: (ORDER + 1, states + functions, columns * width), where drive and waves follow the
-    states, and (ORDER, elements, columns * width).
+    The third one is K times the deflections. Shapes: (ORDER + 1, states + functions, columns *
+    width), where drive and waves follow the states, and twice (ORDER, elements, columns * width).
     """
     states, columns, elements = place.states, place.columns, place.elements
     functions = 1 + place.waves
@@ -264,7 +285,7 @@ def motion_series(matrices, acting, inputs, forcing, place):
     for element in range(elements):
         for at in range((states + 1 + element) * width, (states + 2 + element) * width):
             gap[0, element, at] += 1.0
-    return psi, gap
+    return psi, gap, force
 
 
 @part

@@ -8,18 +8,25 @@ import math
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import suspects_of
-from gearchaos_kernels.memory.block_memory import read_branches, read_lane, state_before, state_of
+from gearchaos_kernels.memory.block_memory import (
+    read_branches,
+    read_lane,
+    state_before,
+    state_of,
+    store,
+)
 from gearchaos_kernels.memory.rows import (
     STATE,
     STRIDE,
     VECTOR,
     Branch,
+    State,
     control_rows,
     rows,
 )
-from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.memory.tuples import along, each
 from gearchaos_kernels.methods.flow_map import vectors
-from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
+from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, no_waves, waves_at
 from gearchaos_kernels.methods.flow_map.sets import enter, number_of
 from gearchaos_kernels.models.interfaces import (
     forcing_at,
@@ -27,6 +34,7 @@ from gearchaos_kernels.models.interfaces import (
     half_clearances,
     inputs_of,
     mean_gaps,
+    observed_at,
     point_of_waves,
 )
 
@@ -48,6 +56,8 @@ def begin_lane(memory, slot, lane, given, scene):
     memory[first * STRIDE + slot] = inputs[0]
     for number in range(1, place.inputs):
         memory[(first + place.elements + number) * STRIDE + slot] = inputs[number]
+    if scene.traced is not None:
+        store_means(memory, slot, lane, scene)
     if scene.resolved is None:
         branches = each(always_engaged, half_clearances(lane, scene))
         store_offsets(memory, slot, lane, branches, scene)
@@ -55,6 +65,19 @@ def begin_lane(memory, slot, lane, given, scene):
         store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
         if place.on_demand:
             enter(memory, slot, given, scene)
+
+
+@scalar
+def store_means(memory, slot, lane, scene):
+    """Store the constant part of each signal; forces have none."""
+    state, first = state_of(memory, slot, scene), method_rows(scene).means
+    nothing = State(
+        along(state.position, -1.0, state.position), along(state.rate, -1.0, state.rate)
+    )
+    for element in range(layout(scene).elements):
+        memory[(first + element) * STRIDE + slot] = 0.0
+    constant = observed_at(nothing, lane, point_of_waves(no_waves(scene), scene), scene)
+    store(memory, first + layout(scene).elements, slot, constant)
 
 
 @scalar

@@ -57,7 +57,7 @@ MAKING_ON_DEMAND, READING_ON_DEMAND, MOVING_ON_DEMAND = 1_500.0 * SETS_VISITED, 
 """The same times where maps are made on demand, medians of a planetary set of 34 states."""
 
 FEWEST_RECORDED = 240
-"""Fewest steps per period if recorders read every step: they interpolate by parabolas."""
+"""Fewest steps per period if recorders read the end of every step: they interpolate."""
 
 
 def fewest_steps(plan: Plan) -> int:
@@ -128,6 +128,11 @@ def _sizes(system: Any, plan: Plan, scene: Scene, stable: Floats | NDArray[np.in
     return sizes
 
 
+def which_maps(scene: Scene) -> tuple[object, ...]:
+    """Return what the maps of a scene depend on besides its model."""
+    return scene.resolved, scene.jumps, scene.traced
+
+
 class _Kept:
     """Computed maps in one table, one after the other, until no more fit.
 
@@ -162,7 +167,7 @@ def maps_of(
     """
     global _kept
     scene = scene.bare()
-    name = (steps, type(scene.model), scene.model, scene.resolved, system.map_constants())
+    name = (steps, type(scene.model), scene.model, *which_maps(scene), system.map_constants())
     names = [(name, row.tobytes()) for row in system.map_parameters()]
     done, together = 0, 1
     while done < len(names):
@@ -223,9 +228,13 @@ def make_tables(
     width = place.states + 1 + place.waves + place.elements
     matrices = np.zeros((lanes, place.states + place.elements, width))
     dampers = np.zeros((lanes, place.elements, width - place.elements + 1))
-    differentiate(coefficients, matrices, dampers, scene)
+    seen = max(0, place.signals - place.elements)
+    # The last column of the observed signals is their constant part.
+    observed = np.zeros((lanes, seen, width - place.elements + 1))
+    traced = observed, np.zeros((lanes, place.elements, 3))
+    differentiate(coefficients, matrices, dampers, traced, scene)
     engaged = 1.0 - (sets[:, :, np.newaxis] >> np.arange(place.elements)) % 2
-    elements_on = engaged, dampers, model.stiffness(scene.model, coefficients)
+    elements_on = engaged, dampers, model.stiffness(scene.model, coefficients), *traced
     forcing = system.wave_series(steps, ORDER)
     make_maps(matrices, elements_on, inputs, forcing, tables, tails, place)
     return tables, tails < TAIL, np.isfinite(coefficients).all(axis=1)

@@ -26,6 +26,7 @@ from gearchaos_kernels.memory.rows import (
     rows_of,
 )
 from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_of, layout_of, method_rows_of
+from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 from gearchaos_kernels.scene import Scene, provider_of
 
 _DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
@@ -135,6 +136,30 @@ class _Writer:
     def constant(self, number: float) -> Any:
         """Return a vector whose components all equal a constant."""
         return ir.Constant(ir.VectorType(_DOUBLE, VECTOR), [number] * VECTOR)
+
+    def add(self, a: Any, b: Any) -> Any:
+        """Return a + b."""
+        return self.builder.fadd(a, b, flags=_FLAGS)
+
+    def times(self, a: Any, b: Any) -> Any:
+        """Return a b."""
+        return self.builder.fmul(a, b, flags=_FLAGS)
+
+    def negative(self, a: Any) -> Any:
+        """Return -a."""
+        return self.builder.fneg(a, flags=_FLAGS)
+
+    def greater(self, a: Any, b: Any) -> Any:
+        """Return the mask of the components in which a exceeds b."""
+        return self.builder.fcmp_ordered(">", a, b)
+
+    def smaller(self, a: Any, b: Any) -> Any:
+        """Return the mask of the components in which b exceeds a."""
+        return self.builder.fcmp_ordered("<", a, b)
+
+    def choose(self, mask: Any, a: Any, b: Any) -> Any:
+        """Return a where a mask is true, and b elsewhere."""
+        return self.builder.select(mask, a, b)
 
     def size(self, vector: Any) -> Any:
         """Return the absolute values of the components of a vector."""
@@ -381,7 +406,7 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
     place, at, block = layout_of(scene.scene), aside_of(scene.scene), rows_of(scene.scene)
 
     def apply(w, vector, branch_maps, mask):
-        parts = [place.switch, place.damper] if place.damper < place.size else [place.switch]
+        parts = [place.switch, place.damper] if place.damper < place.signal else [place.switch]
         count = TERMS * len(parts)
         given = {block.state_before: w.rows(vector, range(at.sums, at.sums + count))}
         if scene.scene.tangent is not None:
@@ -456,7 +481,7 @@ def sum_along(_typing, aside, scene):
             for k in range(TERMS):
                 value = w.sum(enumerate(terms), integrals[k:])
                 w.put(builder.fmul(value, factor, flags=_FLAGS), vector, target + k, None)
-            if place.damper < place.size:
+            if place.damper < place.signal:
                 twice = builder.fmul(factor, w.constant(2.0), flags=_FLAGS)
                 for k, value in enumerate(w.slopes(terms, powers, integrals, source != 0)):
                     rate = builder.fmul(value, twice, flags=_FLAGS)
@@ -479,6 +504,10 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
     copied += [at.suspect]
     copied += range(forced.inputs, forced.inputs + place.columns - place.states)
     copied += [forced.maps] * place.on_demand
+    if place.signals:
+        copied += range(forced.means, forced.means + place.signals)
+        first = accumulated_of(scene.scene)
+        copied += range(first, first + SIGNAL_ROWS * place.signals)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)

@@ -18,7 +18,7 @@ from gearchaos_kernels.memory.block_memory import (
     write_state,
 )
 from gearchaos_kernels.memory.rows import STATE, STRIDE, rows
-from gearchaos_kernels.methods.protocol import Method, Share, cut
+from gearchaos_kernels.methods.protocol import Integers, Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
 from gearchaos_kernels.methods.rk4.stability import amplification, stable_reach
@@ -42,7 +42,7 @@ class Rk4:
     """Identifies RK4 in a scene; it has no flags."""
 
 
-def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
+def prepare(system: Any, plan: Plan, _scene: Scene, _periods: Integers) -> Iterator[Share]:
     """Yield all lanes as one share: RK4 prepares nothing for them."""
     lanes, steps = system.lanes, plan.steps_per_period
     blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
@@ -142,6 +142,7 @@ RK4 = Method(
     name="rk4",
     flags=Rk4,
     always_resolved=False,
+    traces=False,
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,

@@ -58,9 +58,10 @@ def approach(values, lane, scene):
 
 
 @scalar
-def axial_approach(values, lane):
-    """Return (delta_3 - delta_4) / sin(beta_b) (eq. 7), or its rate from rates."""
-    return lane.mass_ratio_p * values.axial_p + lane.mass_ratio_g * values.axial_g
+def axial_approach(values, lane, less):
+    """Return (delta_3 - delta_4) / sin(beta_b) (eq. 7), or its rate from rates, less a number."""
+    # The sum begins with the number: both products are then fused into it.
+    return -less + lane.mass_ratio_p * values.axial_p + lane.mass_ratio_g * values.axial_g
 
 
 @scalar
@@ -72,8 +73,8 @@ def gaps_at(state, lane, forcing, scene):
     moved = forcing.error_rate if scene.model.undamped is not None else 0.0
     if scene.model.axial is None:
         return (Gap(gap, rate, rate + moved),)
-    axial_gap = axial_approach(state.position, lane) - gap - forcing.axial_error
-    axial_rate = axial_approach(state.rate, lane) - forcing.axial_error_rate - rate
+    axial_gap = axial_approach(state.position, lane, gap + forcing.axial_error)
+    axial_rate = axial_approach(state.rate, lane, rate + forcing.axial_error_rate)
     return Gap(gap, rate, rate + moved), Gap(axial_gap, axial_rate, axial_rate + moved)
 
 
@@ -161,13 +162,15 @@ def accelerations(state, pushes, forcing, lane, scene):
             - lane.transverse_stiffness_g * y.transverse_g
         ) - force
     if scene.model.axial is not None:
+        # No other row waits for these two. They begin with the force, so that both products are
+        # fused into the sum.
         axial_force = pushes[1].force
         axial_p = (
-            -lane.axial_damping_p * w.axial_p - lane.axial_stiffness_p * y.axial_p
-        ) - axial_force
+            -axial_force - lane.axial_damping_p * w.axial_p - lane.axial_stiffness_p * y.axial_p
+        )
         axial_g = (
-            -lane.axial_damping_g * w.axial_g - lane.axial_stiffness_g * y.axial_g
-        ) - axial_force
+            -axial_force - lane.axial_damping_g * w.axial_g - lane.axial_stiffness_g * y.axial_g
+        )
     torsion = forcing.drive - force
     if scene.model.friction is not None:
         torsion += lane.friction * force
