@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels.contact import branches, leaving
 from gearchaos_kernels.contact.leaving import NEVER
-from gearchaos_kernels.memory.rows import Branch
+from gearchaos_kernels.memory.rows import ContactBranch
 from gearchaos_kernels.models.protocol import ElementKind, Gap
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
@@ -199,7 +199,7 @@ gap = st.one_of(
 rate = st.one_of(st.floats(-6.0, 6.0), st.just(0.0))
 
 
-def distance_inside(curve: np.polynomial.Polynomial, branch: Branch) -> np.ndarray:
+def distance_inside(curve: np.polynomial.Polynomial, branch: ContactBranch) -> np.ndarray:
     """Return how far a gap is inside its branch, at many instants and where it turns."""
     gaps = curve(np.concatenate([SAMPLES, turning_points(curve)]))
     if branch.engaged:
@@ -293,8 +293,8 @@ def test_from_a_flank_a_gap_comes_between_the_flanks_and_from_there_to_the_flank
 @pytest.mark.parametrize("b", [0.0, HALF_BACKLASH])
 def test_a_one_sided_element_has_two_branches_that_follow_each_other(b):
     free, engaged = (branch_at(gap, b, ONE_SIDED) for gap in (-9.0 * (1.0 + b), b))
-    assert free == Branch(0.0, 0.0, -math.inf, b)
-    assert engaged == Branch(1.0, b, b, math.inf)
+    assert free == ContactBranch(0.0, 0.0, -math.inf, b)
+    assert engaged == ContactBranch(1.0, b, b, math.inf)
     assert next_branch(free, b, b, ONE_SIDED) == engaged
     assert next_branch(engaged, math.nextafter(b, -1.0), b, ONE_SIDED) == free
 
@@ -319,7 +319,7 @@ def test_neighbouring_branches_meet_at_the_boundary():
             assert engaged[:2] == (1.0, side)
             assert engaged.engaged * side - engaged.offset == 0.0
             assert engaged.floor <= side <= engaged.ceiling
-            assert branch_at(math.nextafter(side, 0.0), b) == Branch(0.0, 0.0, -b, b)
+            assert branch_at(math.nextafter(side, 0.0), b) == ContactBranch(0.0, 0.0, -b, b)
 
 
 def test_without_clearance_there_is_no_branch_to_leave():

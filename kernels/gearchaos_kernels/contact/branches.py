@@ -12,7 +12,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import store
-from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
+from gearchaos_kernels.memory.rows import BRANCH, STRIDE, ContactBranch, rows
 from gearchaos_kernels.memory.tuples import as_mask, each
 from gearchaos_kernels.models.interfaces import gap_speeds, half_clearances
 from gearchaos_kernels.recorders.protocol import record_crossing
@@ -69,18 +69,18 @@ def branch_at(gap, half_clearance, kind):
     if kind.one_sided:
         return one_sided_branch(1.0 if gap >= half_clearance else 0.0, half_clearance)
     if half_clearance == 0.0:
-        return Branch(1.0, 0.0, -math.inf, math.inf)
+        return ContactBranch(1.0, 0.0, -math.inf, math.inf)
     if gap >= half_clearance:
-        return Branch(1.0, half_clearance, half_clearance, math.inf)
+        return ContactBranch(1.0, half_clearance, half_clearance, math.inf)
     if gap <= -half_clearance:
-        return Branch(1.0, -half_clearance, -math.inf, -half_clearance)
-    return Branch(0.0, 0.0, -half_clearance, half_clearance)
+        return ContactBranch(1.0, -half_clearance, -math.inf, -half_clearance)
+    return ContactBranch(0.0, 0.0, -half_clearance, half_clearance)
 
 
 @scalar
 def one_sided_branch(engaged, half_clearance):
     """Return the branch of an element without a back flank: 1 in contact, 0 apart."""
-    return Branch(
+    return ContactBranch(
         engaged,
         engaged * half_clearance,
         half_clearance if engaged != 0.0 else -math.inf,
@@ -119,7 +119,7 @@ def next_branch(branch, gap, half_clearance, kind):
     end = offset if meets != 0.0 else half_clearance
     floor = -math.inf if offset < 0.0 else -end if meets == 0.0 else end
     ceiling = math.inf if offset > 0.0 else end
-    return Branch(meets, offset, floor, ceiling)
+    return ContactBranch(meets, offset, floor, ceiling)
 
 
 @scalar

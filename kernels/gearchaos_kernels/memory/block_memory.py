@@ -15,7 +15,7 @@ from gearchaos_kernels.memory.rows import (
     STATE,
     STRIDE,
     VECTOR,
-    Branch,
+    ContactBranch,
     State,
     rows,
     rows_of,
@@ -198,7 +198,7 @@ def write_state(
 def read_branches(_typing_context: Any, memory: Any, slot: Any, scene: Any) -> Any:
     """Return the active branch of each element of a lane."""
     count = provider_of(scene.scene.model).elements(scene.scene.model)
-    kind = types.NamedUniTuple(memory.dtype, BRANCH, Branch)
+    kind = types.NamedUniTuple(memory.dtype, BRANCH, ContactBranch)
     branches, at = types.UniTuple(kind, count), rows_of(scene.scene).branches
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:

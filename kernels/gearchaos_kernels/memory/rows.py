@@ -34,7 +34,7 @@ class State(NamedTuple):
     rate: Any
 
 
-class Branch(NamedTuple):
+class ContactBranch(NamedTuple):
     """One linear piece of a clearance function: deflection = engaged * gap - offset.
 
     Attributes
@@ -53,7 +53,7 @@ class Branch(NamedTuple):
     ceiling: float
 
 
-BRANCH = len(Branch._fields)
+BRANCH = len(ContactBranch._fields)
 """Rows of one branch."""
 
 STATE = 0

@@ -20,7 +20,7 @@ from gearchaos_kernels.contact.branches import (
 )
 from gearchaos_kernels.contact.leaving import NEVER, may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
-from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch, rows
+from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, ContactBranch, rows
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
@@ -158,7 +158,7 @@ def cross_over(aside, scene):
             factor = branch.engaged - following.engaged if here else factor
             # One of the two offsets is that of the flank, the other is 0.
             edge = branch.offset + following.offset if here else edge
-            after = Branch(
+            after = ContactBranch(
                 following.engaged if here else branch.engaged,
                 following.offset if here else branch.offset,
                 following.floor if here else branch.floor,

@@ -19,7 +19,7 @@ from gearchaos_kernels.memory.rows import (
     STATE,
     STRIDE,
     VECTOR,
-    Branch,
+    ContactBranch,
     State,
     control_rows,
     rows,
@@ -83,7 +83,7 @@ def store_means(memory, slot, lane, scene):
 @scalar
 def always_engaged(_half_clearance):
     """Return the branch of an element without clearance."""
-    return Branch(1.0, 0.0, -math.inf, math.inf)
+    return ContactBranch(1.0, 0.0, -math.inf, math.inf)
 
 
 @scalar
