@@ -22,6 +22,24 @@ from gearchaos.version import version_text
 Options = TypeVar("Options")
 
 
+class OnceOnly(Action):
+    """Stores the value of an option that has one value, and refuses a second one."""
+
+    def __call__(
+        self,
+        parser: ArgumentParser,
+        namespace: Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Store a value; report an error where the option has been given before."""
+        given = vars(namespace).setdefault("_given", set())
+        if self.dest in given:
+            parser.error(f"argument {option_string}: is given twice; it takes one value")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
 class OptionParser(ArgumentParser, Generic[Options]):
     """Reads the arguments of one command into its options.
 
@@ -72,8 +90,7 @@ class OptionParser(ArgumentParser, Generic[Options]):
         else:
             flags, rules["dest"] = option.flags or (f"--{name.replace('_', '-')}",), name
             self._flags += flags
-            if several:
-                rules["action"] = "append"
+            rules.setdefault("action", "append" if several else OnceOnly)
         action = self.add_argument(*flags, **rules)
         if option.file:
             self.files.append(action)

@@ -255,9 +255,13 @@ def band_lines(stages: "Sequence[Stage]") -> Iterator[str]:
     for stage in stages:
         several = [f"{lanes} on {bands}" for bands, lanes in stage.bands.items() if bands > 1]
         if several:
-            line = f"{stage.start:.6g} to {stage.end:.6g}: of {sum(stage.bands.values())} "
-            line += f"{stage.label} lanes {', '.join(several)} bands"
-            yield from textwrap.wrap(line, WIDTH)
+            counted = sum(stage.bands.values())
+            line = f"of {counted} {stage.label} lanes {', '.join(several)} bands"
+            if len(stage.bands) == 1:
+                line = f"all {counted} {stage.label} lanes on {max(stage.bands)} bands"
+            if counted == 1:
+                line = f"the only {stage.label} lane is on {max(stage.bands)} bands"
+            yield from textwrap.wrap(f"{stage.start:.6g} to {stage.end:.6g}: {line}", WIDTH)
 
 
 def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int) -> Iterator[str]:

@@ -108,13 +108,17 @@ def _extremes(lanes: ShownLanes, rows: Floats) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _diagram_variable(result: Result, variable: str | None) -> str:
-    """Check the variable of a diagram, or return the default."""
-    names = section_variables(result)
+def diagram_variables(result: Result) -> list[str]:
+    """Return the variables that a diagram can show: sections first, then one number per lane."""
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
-    variable = variable or next(iter(names), DEFAULT_VARIABLE)
-    check_variable(variable, (*names, *of_lanes), "of the diagram")
+    return [*section_variables(result), *of_lanes]
+
+
+def _diagram_variable(result: Result, variable: str | None) -> str:
+    """Check the variable of a diagram, or return the default."""
+    variable = variable or next(iter(section_variables(result)), DEFAULT_VARIABLE)
+    check_variable(variable, diagram_variables(result), "of the diagram")
     return variable
 
 
