@@ -11,6 +11,7 @@ from gearchaos.arguments import path_text, texts
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, fault_texts, faults_of
 from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.plausible import implausible
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
 from gearchaos.configuration.tables import Tables
 from gearchaos.configuration.toml_text import (
@@ -323,9 +324,10 @@ class Configuration(Tables):
         """Raise ConfigurationError if a rule between tables is broken."""
         faults = list(_broken_rules(self, set()))
         if faults:
-            raise ConfigurationError(
-                fault_texts(faults, (info.context or {}).get("source", "<python>"))
-            )
+            source = (info.context or {}).get("source", "<python>")
+            # A value in another unit may be the cause.
+            causes = [f"{source}: {text}" for text in implausible(self)]
+            raise ConfigurationError([*fault_texts(faults, source), *causes])
         return self
 
     # The source of a configuration does not matter.
