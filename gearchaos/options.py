@@ -82,8 +82,11 @@ Settings = Annotated[
     ),
 ]
 Units = Annotated[
-    Literal["dimensionless", "physical"],
-    Option("units of the values: %(default)s (default), or physical (um, m/s, N and 1/s)"),
+    Literal["dimensionless", "physical"] | None,
+    Option(
+        "units of the values; physical ones are um, m/s, N, s and Hz (default: physical for a "
+        "response of a physical system, otherwise dimensionless)"
+    ),
 ]
 
 

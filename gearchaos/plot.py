@@ -125,20 +125,21 @@ class PlotOptions(NamedTuple):
     ] = None
     dpi: Annotated[int, Option("pixels per inch (default: %(default)s)", low=50, high=1200)] = 300
     overwrite: Overwrite = False
-    units: Units = "dimensionless"
+    units: Units = None
 
 
 def _plot(options: PlotOptions) -> None:
     from gearchaos.figures.response import is_response
     from gearchaos.results.files.branch_reader import is_branch_file
+    from gearchaos.results.reading.physical_units import in_units
 
     if any(map(is_branch_file, options.results)):
         _plot_branches(options)
         return
     results = [_opened(path, options.at) for path in options.results]
-    if options.units == "physical":
-        results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
+    pairs = zip(results, responses, strict=True)
+    results = [in_units(one, options.units, over_time) for one, over_time in pairs]
     if any(responses):
         flags = {
             "--stages": options.stages,
@@ -148,8 +149,9 @@ def _plot(options: PlotOptions) -> None:
         }
         _draws_alone("a response", options, flags)
     sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
-    if options.units == "physical":
-        sheets = [(f"{name}_physical", draw) for name, draw in sheets]
+    if options.units == ("dimensionless" if responses[0] else "physical"):
+        # The other units are the default.
+        sheets = [(f"{name}_{options.units}", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     size = _write(sheets, targets, options)
     say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")

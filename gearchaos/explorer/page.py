@@ -290,6 +290,7 @@ class ExplorerPage:
         """Return the arguments of the commands that reproduce the page, by figure."""
         ends, motion = self._ends, f"{Path(self._path).stem}_response.h5"
         units = ["--units", "physical"] if self._value("units") == "physical" else []
+        of_motion = ["--units", str(self._value("units"))]
         at = {a: f"--at={a}={coordinate_text(a, value)}" for a, value in self._fixed.items()}
         here = [at[axis] for axis in self._others if axis in at]
         between = ["--from", f"{ends[0]}", "--to", f"{ends[1]}"] if ends else []
@@ -298,8 +299,8 @@ class ExplorerPage:
         return {
             "sweep": ["plot", self._path, *here, *between, *shown, *units],
             "lane": ["response", self._path, *at.values(), *how],
-            "motion": ["plot", motion, "--variable", self._coordinate, *units],
-            "force": ["plot", motion, "--variable", self._force, *units],
+            "motion": ["plot", motion, "--variable", self._coordinate, *of_motion],
+            "force": ["plot", motion, "--variable", self._force, *of_motion],
         }
 
     def _say_commands(self) -> None:

@@ -34,7 +34,7 @@ KINDS = {
     ),
     "train": ("two_stage", (*SHORT, "sweep.count=3")),
 }
-AT_MOST = 120_000  # Milliseconds, far above the time of a change on a busy machine.
+AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machine.
 MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
     [...menu.options].map(one => [one.value, one.textContent])])"""
 """Title of every menu, and value and text of its entries."""
