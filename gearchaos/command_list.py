@@ -6,6 +6,7 @@ COMMANDS = {
     "explore": "open a local page to explore a result",
     "stages": "list the stages of a sweep and refine their boundaries",
     "basins": "find the attractors of a sweep from many starts, and their basins",
+    "shares": "print the shares of motions among drawn gear pairs or starts",
     "branches": "follow periodic orbits as whole branches, stable and unstable",
     "response": "compute the motion at every step of some mesh periods",
     "reproduce": "compute, draw and compare all results of a paper",
@@ -20,5 +21,5 @@ COMMANDS = {
 }
 """The command NAME is the object ``main`` of the module ``gearchaos.NAME``.
 
-Listed here, because importing 16 modules would slow down every start.
+Listed here, because importing 17 modules would slow down every start.
 """

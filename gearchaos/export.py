@@ -10,7 +10,6 @@ in the attributes that pandas reads.
 The path of the file goes to stdout. Needs more packages: pip install gearchaos[export].
 """
 
-import re
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
@@ -102,22 +101,16 @@ def _table(result: "Result", options: ExportOptions, over_time: bool) -> Any:
 
 def _headings(result: "Result", frame: Any) -> dict[str, str]:
     """Return the heading of every column and index level with its unit, [1] for pure numbers."""
-    words = {name: one for name, one in frame.attrs["units"].items() if one}
+    from gearchaos.results.reading.tables import unit_text
+
     known = result.variables
-    flagged = {name for name in words if name in known and known[name].flags}
+    words: dict[str, str] = dict(frame.attrs["units"])
     of_spectra = {f"amplitude_{name}": name for name in known}
-    for name in {*words} - flagged:
-        variable = known.get(of_spectra.get(name, name))
-        scale = variable.scale.stands_for if variable else ""
-        if words[name] == "1" and scale:
-            words[name] = _plain_unit(scale)
-    return {name: f"{name} [{unit}]" for name, unit in words.items() if name not in flagged}
-
-
-def _plain_unit(scale: str) -> str:
-    """Write the unit of a dimensionless variable without formulae: ``k_m b'``."""
-    text = re.sub(r"\^?\{?\\prime\}?", "'", scale.removeprefix("unit "))
-    return re.sub(r"(k_m|')(?=[a-z\\])", r"\1 ", text.replace("$", "")).replace("\\", "")
+    for name in words:
+        variable = known.get(of_spectra.get(name) or name)
+        if variable is not None:
+            words[name] = "" if variable.flags else unit_text(variable)
+    return {name: f"{name} [{unit}]" for name, unit in words.items() if unit}
 
 
 def _spectra(result: "Result") -> Any:

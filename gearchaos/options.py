@@ -81,6 +81,9 @@ Settings = Annotated[
         ("--set",),
     ),
 ]
+AsCsv = Annotated[
+    bool, Option("print a table as CSV, with the unit of each column, instead of text")
+]
 Units = Annotated[
     Literal["dimensionless", "physical"] | None,
     Option(
@@ -88,6 +91,12 @@ Units = Annotated[
         "response of a physical system, otherwise dimensionless)"
     ),
 ]
+
+
+def one_format(as_json: bool, as_csv: bool) -> None:
+    """Raise ConfigurationError if a command is given both --json and --csv."""
+    if as_json and as_csv:
+        raise ConfigurationError("--json and --csv: print one of the two; leave the other out")
 
 
 def placed_coordinates(
