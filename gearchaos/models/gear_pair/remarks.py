@@ -7,8 +7,12 @@ import numpy as np
 from gearchaos_kernels import GearPairs, Teeth
 
 from gearchaos.arrays import Floats
+from gearchaos.iso1328 import cumulative_pitch_um as cumulative_um
+from gearchaos.iso1328 import single_pitch_um
 from gearchaos.models.gear_pair.derivation import LENGTH, Quantities
+from gearchaos.models.gear_pair.physical_tables import Pair, TeethError
 from gearchaos.models.gear_pair.tables import GearPairTables, physical_at
+from gearchaos.models.gear_pair.tooth_deviations import counted_deviations
 from gearchaos.models.stiffness_table import note_of, tables_in
 
 MOST_MODULES = 100.0
@@ -29,6 +33,7 @@ def remarks(
     ``system``: lanes spread over the sweep; ``parameters``: values of the groups and scales by
     name, as a result keeps them.
     """
+    yield from _inspected(config)
     if system.repeats_after > 1:
         yield _parting_pairs(system)
         yield _printed_gaps(config)
@@ -36,6 +41,41 @@ def remarks(
         yield note_of(path, table)
     yield _negative_stiffness(system)
     yield _mistaken_units(config, system.repeats_after > 1, parameters)
+
+
+def _inspected(config: GearPairTables) -> Iterator[str]:
+    """Yield what was understood of the measured deviations of each gear."""
+    error, pair = config.pitch_error, config.pair
+    if not isinstance(error, TeethError) or pair is None:
+        return
+    for name, teeth in zip(("driving", "driven"), pair.teeth, strict=True):
+        gear = getattr(error, name)
+        if gear is None:
+            continue
+        found = counted_deviations(gear)
+        single = float(np.abs(found - np.roll(found, 1)).max())
+        spread = float(np.ptp(found))
+        source = f" of {gear.file}, column {gear.column}" if gear.file else ""
+        holds = "single" if gear.cumulative_um is None else "cumulative"
+        grade = _grade_of(single, spread, pair, teeth)
+        yield (
+            f"{name} gear: {teeth} teeth{source}, {holds} deviations; their range is "
+            f"{spread:.4g} um and the largest single deviation {single:.4g} um: {grade}"
+        )
+
+
+def _grade_of(single: float, spread: float, pair: Pair, teeth: int) -> str:
+    """Return the best accuracy grade of ISO 1328-1:1995 that a gear passes, in words."""
+    module = pair.normal_module_mm
+    diameter = teeth * module / math.cos(math.radians(pair.helix_angle_deg))
+    try:
+        for grade in range(1, 13):
+            limits = (limit(grade, module, diameter) for limit in (single_pitch_um, cumulative_um))
+            if all(one <= most for one, most in zip((single, spread), limits, strict=True)):
+                return f"grade {grade} of ISO 1328-1:1995"
+    except ValueError:
+        return "outside the ranges of ISO 1328-1:1995"
+    return "worse than grade 12 of ISO 1328-1:1995"
 
 
 def _printed_gaps(config: GearPairTables) -> str:
