@@ -27,7 +27,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
 
     Parameters
     ----------
-    config : Configuration or path
+    config : Configuration, mapping or path
         Scene, start, transient and recorded periods.
     periods : int
         Mesh periods at the end of the recorded periods.
