@@ -148,8 +148,8 @@ class PlotOptions(NamedTuple):
 
     def one_by_one(self) -> "list[PlotOptions]":
         """Return options for one figure of each variable."""
-        each = [(name,) for name in dict.fromkeys(self.variables)] or [()]
-        return [self._replace(variables=one) for one in each]
+        each: list[tuple[str, ...]] = [(name,) for name in dict.fromkeys(self.variables)]
+        return [self._replace(variables=one) for one in each or [()]]
 
 
 def _plot(options: PlotOptions) -> None:

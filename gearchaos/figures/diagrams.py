@@ -28,7 +28,14 @@ from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
-from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER, RECORD, STANDARD_ERROR, STATUS
+from gearchaos.outputs.names import (
+    EXPONENT_NUMBER,
+    LARGEST_EXPONENT,
+    ORDER,
+    RECORD,
+    STANDARD_ERROR,
+    STATUS,
+)
 from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
@@ -109,10 +116,14 @@ def _extremes(lanes: ShownLanes, rows: Floats) -> tuple[Floats, Floats]:
 
 
 def diagram_variables(result: Result) -> list[str]:
-    """Return the variables that a diagram can show: sections first, then one number per lane."""
+    """Return the variables that a diagram can show: sections first, then numbers of each lane.
+
+    The last ones have a number for each Lyapunov exponent.
+    """
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
-    return [*section_variables(result), *of_lanes]
+    spectrum = (*result.axes, EXPONENT_NUMBER)
+    return [*section_variables(result), *of_lanes, *(v.name for v in numbers if v.dims == spectrum)]
 
 
 def _diagram_variable(result: Result, variable: str | None) -> str:
