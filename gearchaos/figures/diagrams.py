@@ -179,6 +179,9 @@ def lyapunov(
     line, parts = _draw_exponents(axes, result, shown, look)
     named: list[Artist] = [parts["band"]] if (shown.spread[shown.finite] > 0.0).any() else []
     named += _circle_mixed(axes, result, shown)
+    if (shown.values[shown.finite & ~shown.isolated] > 0.0).any():
+        parts["positive"].set_label("positive exponent")
+        named.append(parts["positive"])
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     reach = np.nan_to_num(shown.spread)
     own = Diagram(line, shown.lanes, shown.values, shown.values, reach, named, parts)
@@ -260,7 +263,7 @@ def _circle_mixed(axes: Axes, result: Result, shown: _Exponents) -> list[Line2D]
         return []
     x, exponent = (array[shown.drawn][mixed] for array in (shown.lanes.parameter, shown.values))
     look: dict[str, Any] = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
-    return axes.plot(x, exponent, "o", label="came from another motion", **look)
+    return axes.plot(x, exponent, "o", label="settled after a transient", **look)
 
 
 def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:

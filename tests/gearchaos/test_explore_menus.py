@@ -16,6 +16,7 @@ from .commands import small_config
 from .test_explore import CHROMIUM, OPTIONS, missing
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(bool(missing), reason=f"without {', '.join(missing)}"),
     pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here"),
 ]
