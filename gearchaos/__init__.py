@@ -40,6 +40,10 @@ __all__ = sorted(name for names in _HOMES.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from gearchaos.version import software_version
+
+        return software_version()
     for home, names in _HOMES.items():
         if name in names:
             from importlib import import_module

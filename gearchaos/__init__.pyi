@@ -12,3 +12,5 @@ from gearchaos.results.reading.result import Result as Result
 from gearchaos.results.reading.result import open_result as open_result
 from gearchaos.system import System as System
 from gearchaos.version import software_version as software_version
+
+__version__: str

@@ -64,16 +64,14 @@ class AccuracyOptions(NamedTuple):
 def _accuracy(options: AccuracyOptions) -> None:
     from gearchaos.engine.run_plan import plan_run
     from gearchaos.engine.running import choose_threads
-    from gearchaos.figures.page import FORMATS, save_figure
+    from gearchaos.figures.page import FORMATS, check_figures, save_figure
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.models import load_config
-    from gearchaos.results.files.atomic_file import check_output
 
     config = load_config(options.config, options.settings)
     stem = options.output or f"{Path(options.config).stem}_accuracy"
     targets = [f"{stem}.{ending}" for ending in FORMATS]
-    for target in targets:
-        check_output(target, options.overwrite)
+    check_figures([*map(Path, targets)], [], options.overwrite)
     choose_threads(options.threads)
     config = _measurable(config, options.steps[0])
     settings = measure(plan_run(config), options.steps, options.lanes)
@@ -87,7 +85,7 @@ def _accuracy(options: AccuracyOptions) -> None:
     points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
     page = work_precision_page(points)
     for target in targets:
-        save_figure(page, target, overwrite=options.overwrite)
+        save_figure(page, target)
     say(f"written: {', '.join(targets)}")
 
 

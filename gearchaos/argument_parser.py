@@ -22,12 +22,30 @@ from gearchaos.version import version_text
 Options = TypeVar("Options")
 
 
+class OnceOnly(Action):
+    """Stores the value of an option that has one value, and refuses a second one."""
+
+    def __call__(
+        self,
+        parser: ArgumentParser,
+        namespace: Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Store a value; report an error where the option has been given before."""
+        given = vars(namespace).setdefault("_given", set())
+        if self.dest in given:
+            parser.error(f"argument {option_string}: is given twice; it takes one value")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
 class OptionParser(ArgumentParser, Generic[Options]):
     """Reads the arguments of one command into its options.
 
     ``prog`` is the name of the command. ``text`` is what --help prints: its first paragraph before
     the options, the others after them. ``kind`` is the type of the options. Every command also has
-    --help, --quiet and --version. ``files`` are the actions whose values are files.
+    --help, --quiet, --log and --version. ``files`` are the actions whose values are files.
     """
 
     def __init__(self, prog: str, text: str, kind: type[Options]) -> None:
@@ -36,14 +54,18 @@ class OptionParser(ArgumentParser, Generic[Options]):
         self._fields: tuple[str, ...] = vars(kind)["_fields"]
         self._defaults: dict[str, Any] = vars(kind)["_field_defaults"]
         self._repeated: set[str] = set()
-        self._flags = ["--help", "--quiet", "--version"]
+        self._flags = ["--help", "--log", "--quiet", "--version"]
         self.files: list[Action] = []
+        self.log_file: str | None = None
         for name, hint in get_type_hints(kind, include_extras=True).items():
             held, option = get_args(hint)
             if isinstance(option, Option):
                 self._add(name, held, option)
         self.add_argument(
             "-q", "--quiet", action="store_true", help="print only errors and warnings on stderr"
+        )
+        self.files.append(
+            self.add_argument("--log", metavar="FILE", help="append all messages to this file")
         )
         self.add_argument("--version", action="version", help="print the version and exit")
 
@@ -72,14 +94,13 @@ class OptionParser(ArgumentParser, Generic[Options]):
         else:
             flags, rules["dest"] = option.flags or (f"--{name.replace('_', '-')}",), name
             self._flags += flags
-            if several:
-                rules["action"] = "append"
+            rules.setdefault("action", "append" if several else OnceOnly)
         action = self.add_argument(*flags, **rules)
         if option.file:
             self.files.append(action)
 
     def read(self, arguments: Sequence[str]) -> tuple[Options, bool]:
-        """Return the options, and whether --quiet is given.
+        """Return the options, and whether --quiet is given; keep the file of --log.
 
         Raises ConfigurationError for arguments that cannot be read, SystemExit after --help and
         --version.
@@ -87,6 +108,7 @@ class OptionParser(ArgumentParser, Generic[Options]):
         # argparse takes negative numbers with an exponent for options.
         given = [re.sub(r"^-(?=[\d.]+[eE][-+]?\d+$)", " -", text) for text in arguments]
         found, unknown = self.parse_known_args(given, Namespace())
+        self.log_file = found.log
         if unknown:
             near = self._nearest(unknown[0])
             hint = f" (did you mean {near}?)" if near else ""

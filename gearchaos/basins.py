@@ -14,7 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
-from gearchaos.options import Option, Overwrite, Place, Threads, placed_coordinates
+from gearchaos.options import (
+    AsCsv,
+    Option,
+    Overwrite,
+    Place,
+    Threads,
+    one_format,
+    placed_coordinates,
+)
 
 if TYPE_CHECKING:
     from gearchaos.results.reading.ensembles import Basins
@@ -47,6 +55,7 @@ class BasinsOptions(NamedTuple):
         ),
     ] = ()
     json: Annotated[bool, Option("print JSON, with sections and means of all variables")] = False
+    csv: AsCsv = False
     overwrite: Overwrite = False
     threads: Threads = None
 
@@ -61,6 +70,7 @@ def _basins(options: BasinsOptions) -> None:
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
 
+    one_format(options.json, options.csv)
     whole = open_result(options.result)
     if options.output:
         check_figures([options.output], [options.result], options.overwrite)
@@ -72,6 +82,8 @@ def _basins(options: BasinsOptions) -> None:
     where = slice_facts(whole, part)
     if options.json:
         print(json.dumps(json_values(_facts(found, where)), indent=1))
+    elif options.csv:
+        print(_csv(found))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
@@ -87,6 +99,7 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
         one["number"] = one["number"] if one["number"] > 0 else None
     return {
         "parameter": found.parameter,
+        "unit": _unit(found),
         "slice": where,
         "starts": found.numbers.shape[1],
         "basins": basins,
@@ -94,9 +107,36 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
     }
 
 
+def _unit(found: "Basins") -> str:
+    """Return the unit of the parameter as plain text."""
+    from gearchaos.results.reading.tables import unit_text
+
+    result = found.result
+    known = result.variables | result.fixed_axes
+    return unit_text(known[found.parameter]) if found.parameter in known else "1"
+
+
+def _csv(found: "Basins") -> str:
+    """Return what --csv prints: a row for each basin."""
+    from gearchaos.results.reading.tables import csv_text
+
+    headings = [f"{found.parameter} [{_unit(found)}]", "number", "motion", "period [1]"]
+    headings += ["multiplier [1]", "exponent [per unit of tau]", "starts [1]", "share [1]"]
+    headings += ["share, 95 % from [1]", "share, 95 % to [1]"]
+    rows = (
+        (
+            *(one.value, one.number if one.number > 0 else "", one.motion, one.period),
+            *(one.multiplier, one.exponent, one.starts, one.share, *one.share_95_percent),
+        )
+        for one in found.basins
+    )
+    return csv_text(headings, rows)
+
+
 def table(found: "Basins", where: list[str]) -> Iterator[str]:
     """Return the basins as lines of a table, each of at most 80 characters."""
-    yield f"basins over {found.parameter}, {found.numbers.shape[1]} starts at each value"
+    unit = "" if _unit(found) == "1" else f" [{_unit(found)}]"
+    yield f"basins over {found.parameter}{unit}, {found.numbers.shape[1]} starts at each value"
     yield from where
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
     yield f"{head}  {'share':>7}  95 % confidence"

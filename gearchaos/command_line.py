@@ -2,14 +2,15 @@
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, NamedTuple, Self, TypeVar
 
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import Termination, check, heeded
-from gearchaos.progress import complain, discard, speaking, standing_streams
+from gearchaos.progress import complain, discard, log, speaking, standing_streams
 
 if TYPE_CHECKING:
     from gearchaos.argument_parser import OptionParser
@@ -102,11 +103,18 @@ class Command(NamedTuple, Generic[Options]):
     def _code(self, arguments: list[str]) -> int:
         """Read the options, run the body, and return the exit code."""
         try:
-            options, quiet = self.parser().read(arguments)
+            parser = self.parser()
+            options, quiet = parser.read(arguments)
             # Importing matplotlib fails if this variable names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
-            with speaking(quiet=quiet):
-                return self.body(options) or OK
+            with _logged(parser.log_file), speaking(quiet=quiet):
+                try:
+                    return self.body(options) or OK
+                except GearchaosError as error:
+                    # Printed later, when the file is closed.
+                    for text in error.problems:
+                        log("error", text)
+                    raise
         except SystemExit as leaving:
             return leaving.code if isinstance(leaving.code, int) else OK
 
@@ -116,6 +124,35 @@ class Command(NamedTuple, Generic[Options]):
 
         text = f"{self.text.strip()}\n\n{EXIT_CODES}"
         return OptionParser(f"gearchaos {self.name}", text, self.options)
+
+
+@contextmanager
+def _logged(path: str | None) -> Iterator[None]:
+    """Append all messages to a file, with time and level; without a path nothing is logged.
+
+    Raises FileError if the file cannot be written.
+    """
+    if path is None:
+        yield
+        return
+    import logging
+
+    try:
+        handler = logging.FileHandler(path, encoding="utf-8")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"--log {path}: cannot be written: {reason}; choose another file") from None
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logger = logging.getLogger("gearchaos")
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeHandler(handler)
+        handler.close()
 
 
 def _report(fault: BaseException, texts: list[str], code: int) -> int:

@@ -6,6 +6,7 @@ COMMANDS = {
     "explore": "open a local page to explore a result",
     "stages": "list the stages of a sweep and refine their boundaries",
     "basins": "find the attractors of a sweep from many starts, and their basins",
+    "shares": "print the shares of motions among drawn gear pairs or starts",
     "branches": "follow periodic orbits as whole branches, stable and unstable",
     "control": "keep a gear pair on a periodic orbit by its load",
     "response": "compute the motion at every step of some mesh periods",
@@ -21,5 +22,5 @@ COMMANDS = {
 }
 """The command NAME is the object ``main`` of the module ``gearchaos.NAME``.
 
-Listed here, because importing 17 modules would slow down every start.
+Listed here, because importing 18 modules would slow down every start.
 """

@@ -17,6 +17,9 @@ from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.options import Option, ResultFile
 from gearchaos.progress import say
 
+PORTS = 20
+"""Most ports that are tried, from the wanted one on."""
+
 PACKAGES = ("panel", "holoviews", "datashader")
 
 PATIENCE = 1800
@@ -30,7 +33,7 @@ class ExploreOptions(NamedTuple):
     port: Annotated[
         int,
         Option(
-            "port of the page; 0 takes any free port (default: %(default)s)",
+            "port of the page, or the next free one; 0 takes any free port (default: %(default)s)",
             "N",
             low=0,
             high=65535,
@@ -52,11 +55,11 @@ def _explore(options: ExploreOptions) -> None:
         raise ConfigurationError(
             f"{options.result}: is a response; python -m gearchaos.plot draws it"
         )
-    port = _free_port(HOST, options.port)
     # Must be imported before datashader uses Numba, which settles the processor for all code.
     import gearchaos_kernels  # noqa: F401
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
+    port = _free_port(HOST, options.port)
     from gearchaos.explorer.page import ExplorerPage
     from gearchaos.explorer.policy import origins, protect
 
@@ -83,17 +86,27 @@ def _explore(options: ExploreOptions) -> None:
 
 
 def _free_port(host: str, wanted: int) -> int:
-    """Return the wanted port, or any free one for 0; raise ConfigurationError if it is taken."""
+    """Return the wanted port, or the next free one; for 0, any free one.
+
+    Raises ConfigurationError if the port may not be used, or none of the next ones is free.
+    """
+    from errno import EADDRINUSE
     from socket import create_server
 
     from gearchaos.results.files.atomic_file import reason
 
-    try:
-        with create_server((host, wanted)) as free:
-            port: int = free.getsockname()[1]
-    except OSError as error:
-        rule = f"{reason(error)}; choose another port, or 0 for any that is free"
-        raise ConfigurationError(f"--port {wanted}: {rule}") from error
+    for number in range(wanted, min(wanted + PORTS, 65_536)):
+        try:
+            with create_server((host, number)) as free:
+                port: int = free.getsockname()[1]
+        except OSError as error:
+            if error.errno == EADDRINUSE and number + 1 < min(wanted + PORTS, 65_536):
+                continue
+            rule = f"{reason(error)}; choose another port, or 0 for any that is free"
+            raise ConfigurationError(f"--port {wanted}: {rule}") from error
+        if port != wanted and wanted:
+            say(f"port {wanted} is in use, the page is at port {port}")
+        break
     return port
 
 

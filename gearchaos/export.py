@@ -1,8 +1,11 @@
 """Write a result as a table (.csv, .parquet) or as arrays for MATLAB and Octave (.mat).
 
-A table has one row per lane and one column for each variable that has one number per lane. With
---along section_point it has one row per section point. CSV files give the units in brackets in the
-headings; Parquet files give them in the attributes that pandas reads.
+The table of a sweep has one row per lane and one column for each variable that has one number per
+lane. With --along section_point it has one row per section point. The table of a response has one
+row per instant; --along lane gives its lanes, and --spectrum its amplitude spectra.
+
+CSV files give the units in brackets in the headings, [1] for pure numbers; Parquet files give them
+in the attributes that pandas reads.
 
 The path of the file goes to stdout. Needs more packages: pip install gearchaos[export].
 """
@@ -35,17 +38,23 @@ class ExportOptions(NamedTuple):
     along: Annotated[
         tuple[str, ...],
         Option(
-            "write one row per point of this dimension too, such as section_point, state or time; "
-            "may be repeated",
+            "write one row per point of this dimension too, such as section_point, state or time "
+            "(default: time for a response; lane: none); may be repeated",
             "NAME",
         ),
     ] = ()
+    spectrum: Annotated[
+        bool, Option("of a response, write amplitudes over the frequency instead of the motion")
+    ] = False
     overwrite: Overwrite = False
-    units: Units = "dimensionless"
+    units: Units = None
 
 
 def _export(options: ExportOptions) -> None:
+    from gearchaos.figures.response import is_response
+    from gearchaos.progress import say
     from gearchaos.results.files.atomic_file import check_output, replacing
+    from gearchaos.results.reading.physical_units import in_units
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.tables import needed
 
@@ -53,20 +62,87 @@ def _export(options: ExportOptions) -> None:
     if not options.output.lower().endswith(ENDINGS):
         raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
     result = open_result(options.result)
-    result = result.physical() if options.units == "physical" else result
+    over_time = is_response(result)
+    if options.spectrum and not (over_time and kind != "mat"):
+        rule = "writes a table of a response (.csv, .parquet), which python -m gearchaos.response"
+        raise ConfigurationError(f"--spectrum: {rule} computes; {options.result} has no motion")
+    result = in_units(result, options.units, over_time)
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
         if kind == "mat":
             needed("scipy.io").savemat(partial, _arrays(result), appendmat=False)
-        elif kind == "csv":
-            frame = result.to_dataframe(*options.along)
-            pure, units = ("", "1"), frame.attrs["units"]
-            headings = {n: f"{n} [{units[n]}]" for n in units if units[n] not in pure}
-            frame.rename(columns=headings).rename_axis(index=headings).to_csv(partial)
         else:
-            needed("pyarrow")
-            result.to_dataframe(*options.along).to_parquet(partial, engine="pyarrow")
+            frame = _table(result, options, over_time)
+            if kind == "csv":
+                headings = _headings(result, frame)
+                frame.rename(columns=headings).rename_axis(index=headings).to_csv(partial)
+            else:
+                needed("pyarrow")
+                frame.to_parquet(partial, engine="pyarrow")
+            rows, columns = frame.shape
+            say(f"{rows} row{'s' if rows != 1 else ''} of {columns} columns and {_index(frame)}")
     print(options.output, flush=True)
+
+
+def _index(frame: Any) -> str:
+    """Return the names of the index of a table in words."""
+    return ", ".join(frame.index.names)
+
+
+def _table(result: "Result", options: ExportOptions, over_time: bool) -> Any:
+    """Return the table of the lanes, of points along dimensions, or of amplitude spectra."""
+    from gearchaos.outputs.names import TIME
+
+    if options.spectrum:
+        return _spectra(result)
+    along = [name for name in options.along if name != "lane"]
+    return result.to_dataframe(*along or ([TIME] if over_time and not options.along else ()))
+
+
+def _headings(result: "Result", frame: Any) -> dict[str, str]:
+    """Return the heading of every column and index level with its unit, [1] for pure numbers."""
+    from gearchaos.results.reading.tables import unit_text
+
+    known = result.variables
+    words: dict[str, str] = dict(frame.attrs["units"])
+    of_spectra = {f"amplitude_{name}": name for name in known}
+    for name in words:
+        variable = known.get(of_spectra.get(name) or name)
+        if variable is not None:
+            words[name] = "" if variable.flags else unit_text(variable)
+    return {name: f"{name} [{unit}]" for name, unit in words.items() if unit}
+
+
+def _spectra(result: "Result") -> Any:
+    """Return the single-sided amplitude spectra of all variables of a response over time."""
+    import numpy as np
+
+    from gearchaos.figures.response import (
+        response_variables_of,
+        seconds_per_period,
+        spectrum_of,
+    )
+    from gearchaos.outputs.names import STATUS
+    from gearchaos.results.reading.tables import needed
+
+    pandas, names = needed("pandas"), response_variables_of(result)
+    seconds = seconds_per_period(result)
+    frequency, unit = ("frequency", "Hz") if seconds > 0.0 else ("mesh_order", "1")
+    frames = []
+    for lane in np.flatnonzero(result.lanes(STATUS) == 0).tolist():
+        found = {name: spectrum_of(result, lane, name)[:2] for name in names}
+        order = found[names[0]][0]
+        places = {axis: np.full(order.size, result.along(axis)[lane]) for axis in result.axes}
+        columns = {f"amplitude_{name}": found[name][1] for name in names}
+        over = {frequency: order / seconds if seconds > 0.0 else order}
+        frames.append(pandas.DataFrame({**places, **over, **columns}))
+    if not frames:
+        raise ConfigurationError("--spectrum: every lane of the response diverged")
+    frame = pandas.concat(frames).set_index([*result.axes, frequency])
+    units = {axis: result.variables[axis].units for axis in result.axes} | {frequency: unit}
+    units |= {f"amplitude_{name}": result.variables[name].units for name in names}
+    frame.attrs["units"] = units
+    return frame
 
 
 def _arrays(result: "Result") -> dict[str, Any]:

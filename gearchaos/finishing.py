@@ -1,6 +1,8 @@
 """The name of the result of a command that computes, and its exit code."""
 
+import json
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,14 +31,34 @@ def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
     return output
 
 
-def ending(run: "RunPlan", output: str, diverged: int, *said: str) -> int:
-    """Print the path of the result and these lines, and return the exit code.
+def print_facts(run: "RunPlan", output: str, diverged: int, said: Sequence[str]) -> None:
+    """Print what a run has computed as JSON, for programs."""
+    from gearchaos.configuration.methods import METHODS
+
+    facts = {
+        "output": output,
+        "lanes": len(run.lanes),
+        "diverged": diverged,
+        "method": METHODS[run.plan.method].name,
+        **run.chosen._asdict(),
+        "recorded_periods": run.plan.recorded_periods,
+        "notes": [*run.notes],
+        "remarks": [*said],
+    }
+    print(json.dumps(facts, indent=1), flush=True)
+
+
+def ending(run: "RunPlan", output: str, diverged: int, *said: str, as_json: bool = False) -> int:
+    """Print the path of the result, or facts as JSON, and these lines; return the exit code.
 
     Too many diverged lanes give a warning and an exit code of their own.
     """
     from gearchaos.configuration.methods import METHODS
 
-    print(output, flush=True)
+    if as_json:
+        print_facts(run, output, diverged, said)
+    else:
+        print(output, flush=True)
     say(*said)
     allowed = run.config.outputs.allowed_diverged_share
     if diverged <= allowed * len(run.lanes):
@@ -50,7 +72,7 @@ def ending(run: "RunPlan", output: str, diverged: int, *said: str) -> int:
     return TOO_MANY_DIVERGED
 
 
-def complete_already(run: "RunPlan", output: str) -> int | None:
+def complete_already(run: "RunPlan", output: str, *, as_json: bool = False) -> int | None:
     """Return the exit code of a sweep whose complete result exists, or None.
 
     Raises FileError if the result belongs to another configuration or version of gearchaos.
@@ -75,4 +97,4 @@ def complete_already(run: "RunPlan", output: str) -> int | None:
             store.remove()
     diverged = int((found["status"] != 0).sum())
     text = f"complete already: {found['status'].size} lanes, {diverged} diverged"
-    return ending(run, output, diverged, text)
+    return ending(run, output, diverged, text, as_json=as_json)

@@ -81,10 +81,22 @@ Settings = Annotated[
         ("--set",),
     ),
 ]
-Units = Annotated[
-    Literal["dimensionless", "physical"],
-    Option("units of the values: %(default)s (default), or physical (um, m/s, N and 1/s)"),
+AsCsv = Annotated[
+    bool, Option("print a table as CSV, with the unit of each column, instead of text")
 ]
+Units = Annotated[
+    Literal["dimensionless", "physical"] | None,
+    Option(
+        "units of the values; physical ones are um, m/s, N, s and Hz (default: physical for a "
+        "response of a physical system, otherwise dimensionless)"
+    ),
+]
+
+
+def one_format(as_json: bool, as_csv: bool) -> None:
+    """Raise ConfigurationError if a command is given both --json and --csv."""
+    if as_json and as_csv:
+        raise ConfigurationError("--json and --csv: print one of the two; leave the other out")
 
 
 def placed_coordinates(

@@ -69,9 +69,23 @@ class PlotOptions(NamedTuple):
             ("--format",),
         ),
     ] = None
-    variable: Annotated[
-        str | None, Option("variable to draw; the end of --help describes the choices", "NAME")
-    ] = None
+    variables: Annotated[
+        tuple[str, ...],
+        Option(
+            "variable to draw; the end of --help describes the choices; may be repeated, for one "
+            "figure of each",
+            "NAME",
+            ("--variable",),
+        ),
+    ] = ()
+    label: Annotated[
+        tuple[str, ...],
+        Option("legend entry of a result, in the order of the results; may be repeated", "TEXT"),
+    ] = ()
+    title: Annotated[str | None, Option("title of the figure (default: none)", "TEXT")] = None
+    font: Annotated[str | None, Option("font of all texts but formulae, such as Arial", "NAME")] = (
+        None
+    )
     low: Annotated[
         float | None, Option("lowest value of the parameter to show", "VALUE", ("--from",))
     ] = None
@@ -125,20 +139,31 @@ class PlotOptions(NamedTuple):
     ] = None
     dpi: Annotated[int, Option("pixels per inch (default: %(default)s)", low=50, high=1200)] = 300
     overwrite: Overwrite = False
-    units: Units = "dimensionless"
+    units: Units = None
+
+    @property
+    def variable(self) -> str | None:
+        """The variable to draw, None for the default."""
+        return self.variables[0] if self.variables else None
+
+    def one_by_one(self) -> "list[PlotOptions]":
+        """Return options for one figure of each variable."""
+        each: list[tuple[str, ...]] = [(name,) for name in dict.fromkeys(self.variables)]
+        return [self._replace(variables=one) for one in each or [()]]
 
 
 def _plot(options: PlotOptions) -> None:
     from gearchaos.figures.response import is_response
     from gearchaos.results.files.branch_reader import is_branch_file
+    from gearchaos.results.reading.physical_units import in_units
 
     if any(map(is_branch_file, options.results)):
         _plot_branches(options)
         return
     results = [_opened(path, options.at) for path in options.results]
-    if options.units == "physical":
-        results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
+    pairs = zip(results, responses, strict=True)
+    results = [in_units(one, options.units, over_time) for one, over_time in pairs]
     if any(responses):
         flags = {
             "--stages": options.stages,
@@ -147,9 +172,11 @@ def _plot(options: PlotOptions) -> None:
             "--branches": options.branches,
         }
         _draws_alone("a response", options, flags)
-    sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
-    if options.units == "physical":
-        sheets = [(f"{name}_physical", draw) for name, draw in sheets]
+    make = _response_sheets if responses[0] else _sweep_sheets
+    sheets = [sheet for one in options.one_by_one() for sheet in make(results, one)]
+    if options.units == ("dimensionless" if responses[0] else "physical"):
+        # The other units are the default.
+        sheets = [(f"{name}_{options.units}", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     size = _write(sheets, targets, options)
     say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
@@ -160,18 +187,31 @@ def _write(
 ) -> str:
     """Draw and write pages in their formats, and return the size of the last one in words."""
     from gearchaos.figures.page import check_figures, save_figure
+    from gearchaos.figures.style import with_font
 
     sources = [*options.results, *([options.branches] if options.branches else [])]
     check_figures([path for paths in targets for path in paths], sources, options.overwrite)
-    with progress(len(sheets), unit="pages") as bar:
+    with progress(len(sheets), unit="pages") as bar, with_font(options.font):
         for (_, draw), paths in zip(sheets, targets, strict=True):
-            figure = draw()
+            figure = _titled(draw(), options.title)
             for path in paths:
                 save_figure(figure, path, dpi=options.dpi)
                 bar.write(str(path))
             bar.update()
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     return f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
+
+
+def _titled(figure: "Page", title: str | None) -> "Page":
+    """Return a page with a title above all of it."""
+    from gearchaos.figures.labels import plain
+    from gearchaos.figures.page import continued
+
+    if title:
+        before = figure.get_suptitle()
+        with continued(figure):
+            figure.suptitle("\n".join(filter(None, (plain(title), before))))
+    return figure
 
 
 def _plot_branches(options: PlotOptions) -> None:
@@ -190,11 +230,15 @@ def _plot_branches(options: PlotOptions) -> None:
     }
     _draws_alone("a file of branches", options, flags)
     found = read_branches(options.results[0])
-    name = "" if options.variable is None else f"_{options.variable}"
     width, between = options.width or SINGLE_COLUMN_MM, (options.low, options.high)
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": options.height}
-    draw = partial(branches_page, found, options.variable, **size)
-    drawn = _write([(name, draw)], [_targets(options, name, alone=True)], options)
+    shown = [one.variable for one in options.one_by_one()]
+    sheets: list[Sheet] = [
+        ("" if name is None else f"_{name}", partial(branches_page, found, name, **size))
+        for name in shown
+    ]
+    targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
+    drawn = _write(sheets, targets, options)
     orbits = sum(one.value.size for one in found.branches)
     say(f"{len(found.branches)} branches, {orbits} orbits over {found.parameter.name}, {drawn}")
 
@@ -241,6 +285,18 @@ def _draws_alone(page: str, options: PlotOptions, flags: Mapping[str, object]) -
         )
 
 
+def _labels(results: "Sequence[Result]", options: PlotOptions) -> list[str]:
+    """Return the legend entry of each result: those of --label, or the titles."""
+    if not options.label:
+        return _titles(results, options.results)
+    if len(options.label) != len(results):
+        raise FigureError(
+            f"--label: is given {len(options.label)} times for {len(results)} results; give one "
+            "for each result, or none"
+        )
+    return [*options.label]
+
+
 def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
     """Return the titles of results, or the names of their files if two titles are the same."""
     titles = [str(one.metadata.get("title", "")) for one in results]
@@ -274,7 +330,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         return [(name, draw)]
     name += "_stages" if options.stages else ""
-    shown: dict[str, Any] = {"stages": options.stages, "labels": _titles(results, options.results)}
+    shown: dict[str, Any] = {"stages": options.stages, "labels": _labels(results, options)}
     if marked:
         shown["marked"] = (in_words(results[0], marked), [*marked.values()])
     draw = partial(bifurcation_page, results, options.variable, **shown, **size)

@@ -3,7 +3,7 @@
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from contextvars import ContextVar, copy_context
 from functools import cache
@@ -70,14 +70,34 @@ def discard(stream: TextIO) -> None:
 
 
 def complain(*texts: str) -> None:
-    """Print warnings or errors on stderr, one per line, also with --quiet."""
-    print_error("\n".join(f"{_name.get()}: {text}" for text in texts))
+    """Print and log warnings or errors on stderr, one per line, also with --quiet."""
+    for text in texts:
+        log("error" if text.startswith("error: ") else "warning", text)
+    _print(texts)
 
 
 def say(*texts: str) -> None:
-    """Print lines on stderr, but not with --quiet."""
+    """Log lines, and print them on stderr, but not with --quiet."""
+    for text in texts:
+        log("info", text)
     if texts and not _quiet.get():
-        complain(*texts)
+        _print(texts)
+
+
+def _print(texts: Sequence[str]) -> None:
+    print_error("\n".join(f"{_name.get()}: {text}" for text in texts))
+
+
+def log(level: str, text: str) -> None:
+    """Pass a message to the logger of the command, such as ``gearchaos.sweep``.
+
+    It is not imported here, which would take time: without it no handler exists.
+    """
+    if logging := sys.modules.get("logging"):
+        # The handler of the module for loggers without one would repeat warnings on stderr.
+        if not (root := logging.getLogger("gearchaos")).handlers:
+            root.addHandler(logging.NullHandler())
+        getattr(logging.getLogger(_name.get().replace(" ", ".")), level)("%s", text)
 
 
 @contextmanager

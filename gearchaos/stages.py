@@ -17,7 +17,15 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
-from gearchaos.options import Option, Place, ResultFile, Threads, placed_coordinates
+from gearchaos.options import (
+    AsCsv,
+    Option,
+    Place,
+    ResultFile,
+    Threads,
+    one_format,
+    placed_coordinates,
+)
 
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
@@ -57,6 +65,7 @@ class StagesOptions(NamedTuple):
         ),
     ] = None
     json: Annotated[bool, Option("print JSON instead of a table")] = False
+    csv: AsCsv = False
     threads: Threads = None
 
 
@@ -84,6 +93,7 @@ def _stages(options: StagesOptions) -> None:
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import one_axis, require_labels
 
+    one_format(options.json, options.csv)
     whole = open_result(options.result)
     # Lanes are computed again for one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
@@ -96,6 +106,8 @@ def _stages(options: StagesOptions) -> None:
     listing = _listing(whole, part, kept, options)
     if options.json:
         print(json.dumps(json_values(_facts(listing)), indent=1))
+    elif options.csv:
+        print(_csv(listing))
     else:
         print(_text(listing))
 
@@ -141,6 +153,7 @@ def _facts(listing: Listing) -> dict[str, Any]:
     """Return what --json prints."""
     return {
         "parameter": listing.result.axis,
+        "unit": _unit(listing.result, listing.result.axis),
         "slice": listing.where,
         "stages": listing.stages,
         **({} if listing.apart is None else {"directions_apart": listing.apart}),
@@ -149,6 +162,33 @@ def _facts(listing: Listing) -> dict[str, Any]:
         "crises": listing.crises,
         "survival": listing.survival,
     }
+
+
+def _unit(result: "Result", name: str) -> str:
+    """Return the unit of a variable as plain text."""
+    from gearchaos.results.reading.tables import unit_text
+
+    return unit_text(result.variables[name])
+
+
+def _csv(listing: Listing) -> str:
+    """Return what --csv prints: a row for each stage."""
+    from gearchaos.outputs.names import LARGEST_EXPONENT
+    from gearchaos.results.reading.tables import csv_text
+
+    result = listing.result
+    unit = _unit(result, result.axis)
+    rate = _unit(result, LARGEST_EXPONENT) if LARGEST_EXPONENT in result else "1"
+    headings = [f"from [{unit}]", f"to [{unit}]", "motion", "period [1]", "lanes [1]"]
+    headings += [f"lowest exponent [{rate}]", f"highest exponent [{rate}]", "most bands [1]"]
+    rows = (
+        (
+            *(one.start, one.end, one.label, one.period, one.lanes),
+            *(one.lowest_exponent, one.highest_exponent, max(one.bands, default=0)),
+        )
+        for one in listing.stages
+    )
+    return csv_text(headings, rows)
 
 
 def _text(listing: Listing) -> str:
@@ -165,10 +205,13 @@ def _text(listing: Listing) -> str:
     ]
     head += [*slice_lines(listing.where), excitation_of(result.metadata).in_words]
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed)]
+    unit = _unit(result, result.axis)
+    unit = "" if unit == "1" else f" {unit}"
+    below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed, unit)]
     below += directions_apart(listing.apart or ())
     below += [listing.survival.text] if listing.survival else []
-    first = table(result.axis, listing.stages, [*filter(None, head)])
+    axis = f"{result.axis} [{unit.strip()}]" if unit else result.axis
+    first = table(axis, listing.stages, [*filter(None, head)])
     parts = map("\n".join, (first, below, boundary_list(listing.boundaries or ())))
     return "\n\n".join(filter(None, parts))
 
@@ -255,17 +298,26 @@ def band_lines(stages: "Sequence[Stage]") -> Iterator[str]:
     for stage in stages:
         several = [f"{lanes} on {bands}" for bands, lanes in stage.bands.items() if bands > 1]
         if several:
-            line = f"{stage.start:.6g} to {stage.end:.6g}: of {sum(stage.bands.values())} "
-            line += f"{stage.label} lanes {', '.join(several)} bands"
-            yield from textwrap.wrap(line, WIDTH)
+            counted = sum(stage.bands.values())
+            line = f"of {counted} {stage.label} lanes {', '.join(several)} bands"
+            if len(stage.bands) == 1:
+                line = f"all {counted} {stage.label} lanes on {max(stage.bands)} bands"
+            if counted == 1:
+                line = f"the only {stage.label} lane is on {max(stage.bands)} bands"
+            yield from textwrap.wrap(f"{stage.start:.6g} to {stage.end:.6g}: {line}", WIDTH)
 
 
-def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int) -> Iterator[str]:
-    """Return lines for what the table omits: jumps, crises, and records with two motions."""
+def remarks(
+    jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int, unit: str = ""
+) -> Iterator[str]:
+    """Return lines for what the table omits: jumps, crises, and records with two motions.
+
+    ``unit``: that of the swept parameter, after a space, or nothing.
+    """
     for jump in jumping:
-        yield f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
+        yield f"{jump.below:.6g} to {jump.above:.6g}{unit}: jumps to another motion of {jump.label}"
     for crisis in bursting:
-        yield f"{crisis.below:.6g} to {crisis.above:.6g}: crisis, {crisis.section} spans"
+        yield f"{crisis.below:.6g} to {crisis.above:.6g}{unit}: crisis, {crisis.section} spans"
         below = f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below"
         yield f"{below}, {crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
     if mixed:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError, ExecutionError, FileError
-from gearchaos.finishing import complete_already, ending, output_of
+from gearchaos.finishing import complete_already, ending, output_of, print_facts
 from gearchaos.options import (
     Arguments,
     Option,
@@ -53,7 +53,9 @@ class SweepOptions(NamedTuple):
     dry_run: Annotated[bool, Option("estimate time and memory, describe the sweep, and stop")] = (
         False
     )
-    json: Annotated[bool, Option("with --dry-run: print the estimate as JSON")] = False
+    json: Annotated[
+        bool, Option("print a summary as JSON instead of the path; with --dry-run, the estimate")
+    ] = False
     output: OutputFile = None
     overwrite: Overwrite = False
     threads: Threads = None
@@ -74,8 +76,6 @@ def _sweep(options: SweepOptions) -> int:
     choose_threads(options.threads)
     run = plan_run(config)
     output = output_of(options.output, options.config)
-    if options.json and not options.dry_run:
-        raise ConfigurationError("--json: needs --dry-run; the result of a sweep is an HDF5 file")
     if options.dry_run:
         from gearchaos.dry_run import describe
 
@@ -84,7 +84,7 @@ def _sweep(options: SweepOptions) -> int:
         return OK
     code = None
     if options.resume and not options.overwrite:
-        code = complete_already(run, output)
+        code = complete_already(run, output, as_json=options.json)
     return _compute(run, output, shard, options) if code is None else code
 
 
@@ -147,8 +147,11 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
             raise
     said = [f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks]
     if shard is None:
-        return ending(run, output, tally.diverged, *said)
-    print(store.folder, flush=True)
+        return ending(run, output, tally.diverged, *said, as_json=options.json)
+    if options.json:
+        print_facts(run, str(store.folder), tally.diverged, said)
+    else:
+        print(store.folder, flush=True)
     join = _command("merge", output)
     say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")
     return OK

@@ -11,6 +11,7 @@ from gearchaos.arguments import path_text, texts
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, fault_texts, faults_of
 from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.plausible import implausible
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
 from gearchaos.configuration.tables import Tables
 from gearchaos.configuration.toml_text import (
@@ -196,13 +197,13 @@ class Configuration(Tables):
         config._source, config._folder = source, folder
         return config
 
-    def replace(self, path: str, value: Any) -> Self:
-        """Return a copy with another value of one key or table.
+    def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
+        """Return a copy with other values of one key or table, or of several.
 
         Parameters
         ----------
-        path : str
-            Dotted path of the key or table.
+        path : str or mapping
+            Dotted path of the key or table; or all new values by path, which are checked together.
         value : object
             The value, a mapping for a table; None removes the key.
 
@@ -221,8 +222,15 @@ class Configuration(Tables):
         >>> config.replace("integration.recorded_periods", 800).integration.recorded_periods
         800
         """
+        tables: dict[str, Any] = self.tables()
+        changes = path if isinstance(path, Mapping) else {path: value}
+        if wrong := [one for one in changes if not isinstance(one, str)]:
+            raise ConfigurationError(
+                f"{self.source}: {wrong[0]!r}: a path is a text, such as sweep.to"
+            )
         try:
-            tables = with_value(self.tables(), path.split("."), value)
+            for one, changed in changes.items():
+                tables = with_value(tables, one.split("."), changed)
         except KeyError as error:
             raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
         return type(self).from_tables(tables, self.source, self._folder)
@@ -323,9 +331,10 @@ class Configuration(Tables):
         """Raise ConfigurationError if a rule between tables is broken."""
         faults = list(_broken_rules(self, set()))
         if faults:
-            raise ConfigurationError(
-                fault_texts(faults, (info.context or {}).get("source", "<python>"))
-            )
+            source = (info.context or {}).get("source", "<python>")
+            # A value in another unit may be the cause.
+            causes = [f"{source}: {text}" for text in implausible(self)]
+            raise ConfigurationError([*fault_texts(faults, source), *causes])
         return self
 
     # The source of a configuration does not matter.
@@ -335,7 +344,7 @@ class Configuration(Tables):
     __hash__ = None  # type: ignore[assignment]
 
 
-Given: TypeAlias = Configuration | str | os.PathLike[str]
+Given: TypeAlias = Configuration | Mapping[str, Any] | str | os.PathLike[str]
 
 
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
@@ -372,12 +381,9 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
 
 
 def configuration_of(given: Given) -> Configuration:
-    """Return a configuration as given, or read it from a TOML file, see `load_config`."""
+    """Return a configuration as given, from tables, or from a TOML file, see `load_config`."""
     if isinstance(given, Mapping):
-        raise ConfigurationError(
-            "<python>: is a mapping and no configuration; make one of it with "
-            "gearchaos.Configuration.from_tables"
-        )
+        return Configuration.from_tables(given)
     return given if isinstance(given, Configuration) else load_config(given)
 
 

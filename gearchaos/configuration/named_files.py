@@ -37,7 +37,9 @@ def fault_of(key: str, error: Exception, name: str) -> Fault:
 class CsvText:
     """Columns of CSV text below a line of headings.
 
-    Columns are separated by comma, semicolon or tab. Lines that begin with ``#`` are notes.
+    Columns are separated by comma, semicolon or tab. Lines that begin with ``#`` are notes. The
+    line of headings is the first one, or the first one with a given heading: inspection sheets
+    begin with lines about the gear.
 
     Parameters
     ----------
@@ -45,6 +47,8 @@ class CsvText:
         The text.
     decimal_comma : bool
         Whether decimals may have a comma where columns are separated by semicolons or tabs.
+    heading : object
+        A heading in the line of headings, if it is known.
 
     Attributes
     ----------
@@ -52,9 +56,11 @@ class CsvText:
         The headings.
     """
 
-    def __init__(self, text: str, *, decimal_comma: bool = False) -> None:
+    def __init__(self, text: str, *, decimal_comma: bool = False, heading: object = None) -> None:
         # Notes become empty lines, and empty lines are no rows.
         lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
+        at = next((n for n, line in enumerate(lines) if _has(line, heading)), 0)
+        lines[:at] = [""] * at
         headline = next(filter(None, lines), "")
         delimiter = next((mark for mark in ";\t," if mark in headline), ",")
         self._decimal_comma = decimal_comma and delimiter != ","
@@ -67,15 +73,44 @@ class CsvText:
 
         Empty cells at the end do not count. ``whose``: what has one number, in messages.
         """
+        return list(self._numbers(self._cells(name), str(name), whose))
+
+    def numbered_column(self, name: object, numbers: str, whose: str) -> list[float]:
+        """Return the numbers of a column in the order of the whole numbers in another column.
+
+        These must be 0 to n - 1 or 1 to n, each once, in any order. Rows before the first one and
+        after the last one of them are notes. Raises ValueError with rule and remedy.
+        """
+        order, cells = dict(self._cells(numbers)), dict(self._cells(name))
+        lines = [line for line, _ in self._rows]
+        whole = [re.fullmatch(r"\d{1,6}", order.get(line, "")) is not None for line in lines]
+        first = whole.index(True) if True in whole else len(lines)
+        last = next((n for n in range(first, len(lines)) if not whole[n]), len(lines))
+        used = [line for line in lines[first:last] if line in cells]
+        places = [int(order[line]) for line in used]
+        begin = min(min(places, default=0), 1)
+        expected = range(begin, begin + len(used))
+        if sorted(places) != [*expected]:
+            wrong = next(n for n in expected if places.count(n) != 1)
+            state = "missing" if wrong not in places else "there more than once"
+            rule = f"column {numbers}: must hold 0 to n - 1 or 1 to n, each once"
+            raise ValueError(f"{rule}, and {wrong} is {state}", "correct it")
+        values = self._numbers([(line, cells[line]) for line in used], str(name), whose)
+        return [value for _, value in sorted(zip(places, values, strict=True))]
+
+    def _cells(self, name: object) -> list[tuple[int, str]]:
+        """Return line and text of the cells of a column, without empty ones at its end."""
         if name not in self.headings:
             asked = "column is missing" if name is None else f"has no column {shown(name)}"
             # Content is never quoted: the path may lead to any file of this machine.
             raise ValueError(asked, "name a heading of its first line")
-        place = self.headings.index(name)
+        if self.headings.count(str(name)) > 1:
+            raise ValueError(f"has several columns {shown(name)}", "rename all but one of them")
+        place = self.headings.index(str(name))
         cells = [(line, "".join(row[place : place + 1])) for line, row in self._rows]
         while cells and not cells[-1][1]:
             cells.pop()
-        return list(self._numbers(cells, str(name), whose))
+        return cells
 
     def _numbers(self, cells: list[tuple[int, str]], name: str, whose: str) -> Iterator[float]:
         """Yield the cells of a column as numbers."""
@@ -85,3 +120,10 @@ class CsvText:
                 rule = f"line {line}, column {name}: must be a finite number"
                 raise ValueError(rule, f"give one for every {whose}, decimals with a point")
             yield float(text)
+
+
+def _has(line: str, heading: object) -> bool:
+    """Whether a line has a heading among its columns."""
+    return isinstance(heading, str) and any(
+        heading in (cell.strip().strip('"') for cell in line.split(mark)) for mark in ";\t,"
+    )

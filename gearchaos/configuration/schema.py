@@ -6,6 +6,7 @@ from gearchaos.configuration.base import Configuration, configuration_keys
 from gearchaos.configuration.docstrings import docstring_of
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.messages import shown
+from gearchaos.configuration.plausible import PLAUSIBLE
 
 
 def json_schema(kind: type[Configuration]) -> dict[str, Any]:
@@ -65,9 +66,12 @@ def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
     ]
     for key in keys:
         column, unit = key.path.rpartition(".")[2], "" if key.units == "1" else key.units
+        usual = PLAUSIBLE.get(column)
+        bounds = [key.valid.bounds, f"usually {usual.words}" if usual and usual.low else ""]
+        limits = "; ".join(filter(None, bounds))
         # A key that selects the kind of a table has one choice per kind; it is not a range.
         choices = ", ".join(f"`{one}`" for one in key.choices if len(key.choices) > 1)
-        cells = [f"`{column}`", unit, key.valid.bounds or choices, _default(kind, key), key.wording]
+        cells = [f"`{column}`", unit, limits or choices, _default(kind, key), key.wording]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

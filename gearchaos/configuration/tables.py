@@ -3,12 +3,12 @@
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from gearchaos.arrays import Floats, Integers
-from gearchaos.configuration.keys import Key, Table, key
+from gearchaos.configuration.keys import AS_LIST, Key, Table, key
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.run_tables import Integration, Outputs, Scene, Start, Sweep
@@ -42,6 +42,8 @@ class Titled(Table):
     """The keys at the top of every file."""
 
     title: str = key("title of the sweep, for figures and files", default="")
+    unusual: Annotated[tuple[str, ...], AS_LIST] = key(default=())
+    """paths of keys whose values are meant although they are unusual: no warning is printed"""
 
 
 class Tables(Titled):

@@ -18,8 +18,9 @@ LONGEST_EXCITATION = 50_000
 def whole_lengths(lanes: Lanes) -> dict[str, int]:
     """Return transient and record in whole excitation periods, enough to find a period.
 
-    The lengths are in mesh periods, by key. Raises ConfigurationError if the excitation period is
-    too long, or if the record does not have whole cycles of an order whose amplitude is requested.
+    The lengths are in mesh periods, by key. The record also has whole cycles of the mesh orders
+    whose amplitudes are requested. Raises ConfigurationError if the excitation period or the common
+    period of the orders is too long, or if an order has too few steps.
     """
     integration, repeats = lanes.config.integration, lanes.repeats_after
     if repeats > LONGEST_EXCITATION:
@@ -27,23 +28,27 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
             f"{lanes.config.source}: the {lanes.model.excitation_words} after {repeats} mesh "
             f"periods only, more than {LONGEST_EXCITATION}; {lanes.model.shorter_excitation}"
         )
-    least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
-    lengths = {
-        name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)
-        for name, count in least.items()
-    }
-    orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
+    orders = lanes.config.outputs.mesh_orders
     # A chosen number of steps is never smaller.
     most = (integration.fixed_steps or DEFAULT_STEPS) / 2
-    if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
-        whole = math.lcm(repeats, *(order.denominator for order in orders))
+    if unfit := [str(one) for one in orders if one >= most]:
         raise ConfigurationError(
-            f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have whole cycles in "
-            f"the record of {record} mesh periods and more than two steps in each; set "
-            f"integration.recorded_periods to a multiple of {whole}, such as "
-            f"{whole * math.ceil(record / whole)}, and keep to orders below {most:g}"
+            f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have more than two "
+            f"steps in each cycle; keep to orders below {most:g}"
         )
-    return lengths
+    cycles = math.lcm(repeats, *(order.denominator for order in orders))
+    if cycles > LONGEST_EXCITATION:
+        raise ConfigurationError(
+            f"{lanes.config.source}: outputs.orders: only a record of {cycles} mesh periods has "
+            f"whole cycles of all orders, more than {LONGEST_EXCITATION}; give fewer orders, or "
+            "fractions with a common denominator"
+        )
+    least = 1 if repeats == 1 else RETURNS
+    record = max(integration.recorded_periods, least * repeats)
+    return {
+        "transient_periods": repeats * math.ceil(integration.transient_periods / repeats),
+        "recorded_periods": cycles * math.ceil(record / cycles),
+    }
 
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
@@ -57,13 +62,13 @@ def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
 def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
     """Return a remark about transient and record that the excitation makes longer."""
     repeats = lanes.repeats_after
-    if repeats == 1:
-        return ""
     changed = [
         f"integration.{name} raised from {asked} to {length}"
         for name, length in lengths.items()
         if length != (asked := getattr(lanes.config.integration, name))
     ]
+    if repeats == 1:
+        return f"{', '.join(changed)}: whole cycles of outputs.orders" if changed else ""
     longest = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
     shorter = " and shorter ones" if longest > 1 else ""
     text = (

@@ -9,7 +9,9 @@ from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.computing import integrate_places
+from gearchaos.engine.excitation import whole_lengths
 from gearchaos.engine.kept import arrays_of
+from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
 from gearchaos.errors import ConfigurationError
@@ -25,7 +27,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
 
     Parameters
     ----------
-    config : Configuration or path
+    config : Configuration, mapping or path
         Scene, start, transient and recorded periods.
     periods : int
         Mesh periods at the end of the recorded periods.
@@ -62,7 +64,9 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
 
     Raises ConfigurationError if fewer periods are recorded.
     """
-    recorded = config.integration.recorded_periods
+    # An excitation period longer than a mesh period makes the record longer.
+    lanes, given = Lanes(config), config.integration.recorded_periods
+    recorded = max(given, whole_lengths(lanes)["recorded_periods"])
     if not 1 <= periods <= recorded:
         raise ConfigurationError(
             f"{config.source}: periods = {periods}: must be between 1 and "
@@ -70,7 +74,10 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
         )
     # All states are kept, so that effects which act on no output of a sweep are computed, too.
     whole = config.replace("outputs.section", config.states)
-    return plan_run(whole.replace("outputs.section_points", recorded))
+    whole = whole.replace("integration.recorded_periods", recorded)
+    run = plan_run(whole.replace("outputs.section_points", recorded))
+    raised = f"integration.recorded_periods raised from {given} to {recorded}"
+    return run.with_notes(raised if recorded > given else "")
 
 
 def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> Result:

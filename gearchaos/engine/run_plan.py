@@ -6,12 +6,14 @@ from typing import NamedTuple, Self
 import gearchaos_kernels as kernels
 
 from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.plausible import implausible
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.step_choice import steps_for_exponents
 from gearchaos.engine.steps import coarse_steps, needless_maps, stable_steps
+from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
 from gearchaos.records.label import MOST_LABEL_POINTS
 from gearchaos.records.period import POINTS_NEEDED
@@ -118,6 +120,17 @@ def plan_run(config: Configuration) -> RunPlan:
         If the number of steps per period is unstable and must not be raised, or if the excitation
         or the record does not suit the outputs.
     """
+    unusual = [*implausible(config)]
+    try:
+        return _planned(config).with_notes(*unusual)
+    except ConfigurationError as error:
+        # A value in another unit may be the cause.
+        causes = [f"{config.source}: {text}" for text in unusual]
+        raise ConfigurationError([*error.problems, *causes]) from None
+
+
+def _planned(config: Configuration) -> RunPlan:
+    """Return the plan of a run, see `plan_run`."""
     config, reason = with_method(config)
     lanes, integration, outputs = Lanes(config), config.integration, config.outputs
     steps, note = stable_steps(lanes, integration.fixed_steps)

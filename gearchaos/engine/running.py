@@ -46,8 +46,8 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
 
     Parameters
     ----------
-    config : Configuration or path
-        The configuration, or the path of its file.
+    config : Configuration, mapping or path
+        The configuration, its tables as nested mappings, or the path of its file.
     threads : int, optional
         Number of threads; by default all cores.
     progress : bool

@@ -31,6 +31,9 @@ COLOURS = 256  # Most colours of a map.
 FILLED = 0.05
 """Share of filled pixels of a diagram below which dots are enlarged by one pixel."""
 
+NO_VALUES = "no lane has a value of this variable"
+"""Title of a diagram without points."""
+
 VALUE = "z"
 """Name that HoloViews gives to a variable over two axes."""
 
@@ -51,18 +54,21 @@ def diagram(result: Result, variable: str) -> Charts:
         rows = result.lanes(name)[lanes.numbers].reshape(lanes.numbers.size, -1)
         rows = np.where(lanes.diverged[:, np.newaxis], np.nan, rows)
         there = rows[np.isfinite(rows).any(axis=1)]
-        dimensions = _dimensions(result, result.axis, name)
         points = np.repeat(lanes.parameter, rows.shape[1]), rows.ravel()
+        ends = np.nanmin(there, axis=1), np.nanmax(there, axis=1)
+        # Without a value: any limits, and a title with the reason.
+        height = robust_limits(*ends, hold_zero=bool(charts)) if there.size else (0.0, 1.0)
+        frame = {"xlim": lanes.limits, "ylim": height, "title": "" if there.size else NO_VALUES}
+        # Datashader cannot count points whose range is a single value: the limits widen it.
+        sides = zip(_dimensions(result, result.axis, name), (lanes.limits, height), strict=True)
+        dimensions = [one.clone(soft_range=limits) for one, limits in sides]
         if charts:
             chart = downsample1d(hv.Curve(points, *dimensions), width=DRAWN)
             look = {"color": BLACK, "line_width": 1.0, "height": 240, "show_grid": True}
         else:
             chart = rasterize(hv.Points(points, dimensions), aggregator="count").apply(_thickened)
             look = {"cmap": GREYS, "cnorm": "eq_hist", "height": 340}
-        if there.size:
-            ends = np.nanmin(there, axis=1), np.nanmax(there, axis=1)
-            look["ylim"] = robust_limits(*ends, hold_zero=bool(charts))
-        charts.append(chart.opts(xlim=lanes.limits, responsive=True, **look))
+        charts.append(chart.opts(responsive=True, **frame, **look))
     return charts, {}
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from gearchaos.explorer.charts import plain_text
 from gearchaos.figures import response as figures
 from gearchaos.figures.response_page import SHOWN_PERIODS
-from gearchaos.outputs.names import TIME, acceleration_of
+from gearchaos.outputs.names import acceleration_of
 from gearchaos.results.reading.result import Result
 
 SCALES = ("linear", "linear", "log", "linear")
@@ -53,7 +53,7 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
         If the lane diverged.
     """
     history, portrait, spectrum, force = drawn = Figure().subplots(1, 4)
-    late: Any = {"between": (max(0.0, motion[TIME][-1] - SHOWN_PERIODS), None)}
+    late: Any = {"between": (max(0.0, figures.mesh_periods(motion)[-1] - SHOWN_PERIODS), None)}
     figures.time_history(history, motion, 0, coordinate, **late)
     figures.phase_portrait(portrait, motion, 0, coordinate)
     figures.poincare_section(portrait, motion, 0, coordinate)

@@ -21,6 +21,7 @@ from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
 from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
 from gearchaos.explorer.motion import SCALES, empty_panel, show
+from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
@@ -35,7 +36,7 @@ from gearchaos.outputs.names import (
     STATUS,
     coordinate_text,
 )
-from gearchaos.results.reading.result import Result, section_variables
+from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text
 
 WIDE = {"sizing_mode": "stretch_width"}
@@ -127,11 +128,10 @@ class ExplorerPage:
 
     def _variables(self) -> list[str]:
         """Return the names of all variables to draw, the default first."""
-        of_lanes = [one for one in self._result.variables.values() if one.dims == self._result.axes]
-        if len(self._swept) > 1:
-            return sorted((one.name for one in of_lanes), key=lambda name: name != LABELS[0])
-        numbers = [one.name for one in of_lanes if one.dtype == "float64"]
-        return [*section_variables(self._result), *numbers]
+        if len(self._swept) == 1:
+            return diagram_variables(self._result)
+        of_lanes = [name for name in self._result if self._result.dims(name) == self._result.axes]
+        return sorted(of_lanes, key=lambda name: name != LABELS[0])
 
     @property
     def _ends(self) -> list[float]:
@@ -290,6 +290,7 @@ class ExplorerPage:
         """Return the arguments of the commands that reproduce the page, by figure."""
         ends, motion = self._ends, f"{Path(self._path).stem}_response.h5"
         units = ["--units", "physical"] if self._value("units") == "physical" else []
+        of_motion = ["--units", str(self._value("units"))]
         at = {a: f"--at={a}={coordinate_text(a, value)}" for a, value in self._fixed.items()}
         here = [at[axis] for axis in self._others if axis in at]
         between = ["--from", f"{ends[0]}", "--to", f"{ends[1]}"] if ends else []
@@ -298,8 +299,8 @@ class ExplorerPage:
         return {
             "sweep": ["plot", self._path, *here, *between, *shown, *units],
             "lane": ["response", self._path, *at.values(), *how],
-            "motion": ["plot", motion, "--variable", self._coordinate, *units],
-            "force": ["plot", motion, "--variable", self._force, *units],
+            "motion": ["plot", motion, "--variable", self._coordinate, *of_motion],
+            "force": ["plot", motion, "--variable", self._force, *of_motion],
         }
 
     def _say_commands(self) -> None:

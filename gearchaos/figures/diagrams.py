@@ -28,7 +28,14 @@ from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
-from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER, RECORD, STANDARD_ERROR, STATUS
+from gearchaos.outputs.names import (
+    EXPONENT_NUMBER,
+    LARGEST_EXPONENT,
+    ORDER,
+    RECORD,
+    STANDARD_ERROR,
+    STATUS,
+)
 from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
@@ -108,13 +115,21 @@ def _extremes(lanes: ShownLanes, rows: Floats) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _diagram_variable(result: Result, variable: str | None) -> str:
-    """Check the variable of a diagram, or return the default."""
-    names = section_variables(result)
+def diagram_variables(result: Result) -> list[str]:
+    """Return the variables that a diagram can show: sections first, then numbers of each lane.
+
+    The last ones have a number for each Lyapunov exponent.
+    """
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
-    variable = variable or next(iter(names), DEFAULT_VARIABLE)
-    check_variable(variable, (*names, *of_lanes), "of the diagram")
+    spectrum = (*result.axes, EXPONENT_NUMBER)
+    return [*section_variables(result), *of_lanes, *(v.name for v in numbers if v.dims == spectrum)]
+
+
+def _diagram_variable(result: Result, variable: str | None) -> str:
+    """Check the variable of a diagram, or return the default."""
+    variable = variable or next(iter(section_variables(result)), DEFAULT_VARIABLE)
+    check_variable(variable, diagram_variables(result), "of the diagram")
     return variable
 
 
@@ -164,6 +179,9 @@ def lyapunov(
     line, parts = _draw_exponents(axes, result, shown, look)
     named: list[Artist] = [parts["band"]] if (shown.spread[shown.finite] > 0.0).any() else []
     named += _circle_mixed(axes, result, shown)
+    if (shown.values[shown.finite & ~shown.isolated] > 0.0).any():
+        parts["positive"].set_label("positive exponent")
+        named.append(parts["positive"])
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     reach = np.nan_to_num(shown.spread)
     own = Diagram(line, shown.lanes, shown.values, shown.values, reach, named, parts)
@@ -245,7 +263,7 @@ def _circle_mixed(axes: Axes, result: Result, shown: _Exponents) -> list[Line2D]
         return []
     x, exponent = (array[shown.drawn][mixed] for array in (shown.lanes.parameter, shown.values))
     look: dict[str, Any] = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
-    return axes.plot(x, exponent, "o", label="came from another motion", **look)
+    return axes.plot(x, exponent, "o", label="settled after a transient", **look)
 
 
 def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:

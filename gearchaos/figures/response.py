@@ -1,12 +1,13 @@
 """One lane of a response: time history, phase portrait, Poincare section, amplitude spectrum."""
 
+from math import floor, log10
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import EngFormatter, MaxNLocator, NullFormatter
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
@@ -14,10 +15,11 @@ from gearchaos.figures.labels import axis_label, check_variable, place_of, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
-from gearchaos.outputs.names import TIME, acceleration_of
+from gearchaos.outputs.names import MESH_PERIOD, TIME, acceleration_of
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
 from gearchaos.results.reading.excitation import excitation_of
+from gearchaos.results.reading.physical_units import SECONDS
 from gearchaos.results.reading.result import Result, section_variables
 
 COORDINATE = "delta_5"  # Coordinate of a gear pair that is drawn by default: the torsion.
@@ -40,8 +42,9 @@ def time_history(
     variable: str | None = None,
     *,
     between: Between = (None, None),
+    in_periods: bool = False,
 ) -> Line2D:
-    """Draw a variable against time in mesh periods.
+    """Draw a variable against time, in mesh periods, or in seconds where the result has these.
 
     Parameters
     ----------
@@ -56,11 +59,13 @@ def time_history(
         default the first coordinate, ``"delta_5"`` of a gear pair.
     between : (float or None, float or None)
         First and last mesh period to show; None is the end of the record.
+    in_periods : bool
+        Draw against mesh periods also where the result has seconds.
 
     Returns
     -------
     Line2D
-        The curve.
+        The curve. Forces and seconds have the prefix of the largest value, such as kN or ms.
 
     Raises
     ------
@@ -75,17 +80,63 @@ def time_history(
     """
     variable = variable or first_coordinate(result)
     values = motion_over_time(result, lane, variable)
-    time = result[TIME]
+    time = mesh_periods(result)
     low = time[0] if between[0] is None else between[0]
     high = time[-1] if between[1] is None else between[1]
     shown = (time >= low) & (time <= high)
-    (line,) = axes.plot(time[shown], values[shown], color=BLACK, linewidth=0.6)
-    axes.set_xlim(low, high)
+    factor, label = time_axis(result, in_periods)
+    power, prefix = _prefix(result, variable, values)
+    (line,) = axes.plot(factor * time[shown], values[shown] / power, color=BLACK, linewidth=0.6)
+    axes.set_xlim(factor * low, factor * high)
     _label(axes, result, TIME, variable)
+    axes.set(xlabel=label, ylabel=axes.get_ylabel().replace("(N)", f"({prefix}N)"))
     return line
 
 
-def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[PolyCollection]:
+def _prefix(result: Result, variable: str, values: Floats) -> tuple[float, str]:
+    """Return the power of 1000 and the prefix of forces in N; 1 and none for other variables."""
+    if result.variables[variable].units != "N":
+        return 1.0, ""
+    return prefix_of(float(np.abs(values).max()))
+
+
+def mesh_periods(result: Result) -> Floats:
+    """Return the time of a response in mesh periods, shape (samples,)."""
+    time: Floats = result[TIME]
+    return time if result.variables[TIME].units != "s" else time / seconds_per_period(result)
+
+
+def seconds_per_period(result: Result) -> float:
+    """Return the mesh period in seconds; NaN where the time of a response is in mesh periods."""
+    if TIME not in result or result.variables[TIME].units != "s":
+        return float("nan")
+    period = result[MESH_PERIOD]
+    factor = SECONDS[result.variables[MESH_PERIOD].units]
+    return factor * float(period[np.isfinite(period)].flat[0])
+
+
+def time_axis(result: Result, in_periods: bool = False) -> tuple[float, str]:
+    """Return the length of a mesh period on the axis of time, and the label of this axis."""
+    seconds = seconds_per_period(result)
+    if not in_periods and seconds > 0.0:
+        power, prefix = prefix_of(float(result[TIME][-1]))
+        return seconds / power, f"Time, $t$ ({prefix}s)"
+    if seconds > 0.0:
+        return 1.0, "Time in mesh periods"
+    return 1.0, axis_label(result, TIME)
+
+
+def prefix_of(largest: float) -> tuple[float, str]:
+    """Return the power of 1000 of a size and its prefix, such as (1e-3, "m"), as EngFormatter."""
+    powers = EngFormatter.ENG_PREFIXES
+    power = 3 * floor(log10(largest) / 3 + 1e-9) if largest > 0.0 else 0
+    power = min(max(power, min(powers)), max(powers))
+    return 10.0**power, powers[power]
+
+
+def contact_strip(
+    axes: Axes, result: Result, lane: int, variable: str, *, in_periods: bool = False
+) -> list[PolyCollection]:
     """Draw the contact state as a strip along the foot of a time history of a mesh force.
 
     Parameters
@@ -94,6 +145,8 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
         As for `time_history`; the figure needs the constrained layout for its legend.
     variable : str
         Force of an element, such as ``"mesh_force_tangential"``.
+    in_periods : bool
+        As for `time_history`.
 
     Returns
     -------
@@ -107,7 +160,8 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
     >>> line = figures.time_history(axes, result, 0, "mesh_force_tangential")
     >>> bars = figures.contact_strip(axes, result, 0, "mesh_force_tangential")
     """
-    name, time = f"contact_{element_of(result, variable)}", result[TIME]
+    name = f"contact_{element_of(result, variable)}"
+    time = time_axis(result, in_periods)[0] * mesh_periods(result)
     states, strips = result.lanes(name)[lane], []
     first = np.flatnonzero(np.diff(states, prepend=-1))
     begin, lengths = time[first], np.diff(time[first], append=time[-1])
@@ -216,6 +270,7 @@ def amplitude_spectrum(
     variable: str | None = None,
     *,
     highest: float = HIGHEST_ORDER,
+    in_orders: bool = False,
 ) -> LineCollection:
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
 
@@ -227,6 +282,8 @@ def amplitude_spectrum(
         A variable over time, by default the acceleration of the first coordinate.
     highest : float
         Highest multiple of the mesh frequency to show.
+    in_orders : bool
+        Draw against multiples of the mesh frequency also where the result has seconds.
 
     Returns
     -------
@@ -250,22 +307,33 @@ def amplitude_spectrum(
     >>> lines = figures.amplitude_spectrum(axes, gearchaos.open_result("response.h5"), lane=0)
     """
     variable = variable or acceleration_of(first_coordinate(result))
-    order, amplitude, window = _spectrum(result, lane, variable)
+    order, amplitude, window = spectrum_of(result, lane, variable)
     shown = order <= highest
     order, amplitude = order[shown], amplitude[shown]
-    lines = _draw_spectrum(axes, order, amplitude)
-    spare = 0.02 * highest
-    axes.set_xlim(-spare, highest + spare)
-    axes.set_xlabel("Frequency over mesh frequency")
-    axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
+    mesh, label = frequency_axis(result, highest, in_orders)
+    power, prefix = _prefix(result, variable, amplitude)
+    lines = _draw_spectrum(axes, mesh * order, amplitude / power)
+    spare = 0.02 * mesh * highest
+    axes.set_xlim(-spare, mesh * highest + spare)
+    axes.set_xlabel(label)
+    axes.xaxis.set_major_locator(MaxNLocator(9, integer=mesh == 1.0))
     symbol = result.attributes(variable).get("symbol") or plain(variable)
-    unit = unit_of(result, variable)
+    unit = f"{prefix}{unit_of(result, variable)}"
     axes.set_ylabel(f"Amplitude of {symbol}" + (f" ({unit})" if unit else ""))
     remark(axes, window)
     return lines
 
 
-def _spectrum(result: Result, lane: int, variable: str) -> tuple[Floats, Floats, str]:
+def frequency_axis(result: Result, highest: float, in_orders: bool) -> tuple[float, str]:
+    """Return the mesh frequency on the axis of a spectrum up to an order, and its label."""
+    seconds = seconds_per_period(result)
+    if in_orders or not seconds > 0.0:
+        return 1.0, "Frequency over mesh frequency"
+    power, prefix = prefix_of(highest / seconds)
+    return 1.0 / (seconds * power), f"Frequency, $f$ ({prefix}Hz)"
+
+
+def spectrum_of(result: Result, lane: int, variable: str) -> tuple[Floats, Floats, str]:
     """Return orders and amplitudes, each (lines,), and the window in words."""
     values, steps = motion_over_time(result, lane, variable), samples_per_period(result)
     held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
@@ -350,7 +418,7 @@ def once_an_excitation(result: Result, points: int) -> slice:
 
 def samples_per_period(result: Result) -> int:
     """Return the number of samples of a response per mesh period."""
-    return int(np.searchsorted(result[TIME], 1.0))
+    return int(np.searchsorted(mesh_periods(result), 1.0 - 1e-9))
 
 
 def motion_over_time(result: Result, lane: int, variable: str) -> Floats:

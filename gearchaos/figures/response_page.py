@@ -17,7 +17,7 @@ from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, LEGEND, VERMILION
 from gearchaos.models.gear_pair.outputs import MESH_ERROR
-from gearchaos.outputs.names import TIME, acceleration_of
+from gearchaos.outputs.names import acceleration_of
 from gearchaos.results.reading.excitation import Excitation, excitation_of
 from gearchaos.results.reading.result import Result
 
@@ -120,7 +120,7 @@ def _motion(result: Result, lane: int, variable: str) -> _Motion:
     """Check that the lane has the variable, and choose which periods to show."""
     response.motion_over_time(result, lane, variable)
     whole = variable in response.coordinates_of(result)
-    excitation, last = excitation_of(result.metadata), float(result[TIME][-1])
+    excitation, last = excitation_of(result.metadata), float(response.mesh_periods(result)[-1])
     teeth = excitation.driving_teeth if excitation.of_teeth else 0
     shown = (max(0.0, last - (SHOWN_REVOLUTIONS * teeth or SHOWN_PERIODS)), last)
     if teeth:
@@ -146,15 +146,18 @@ def _draw_panels(panels: dict[str, Axes], motion: _Motion) -> None:
     """Draw all panels, those for teeth with errors of their own over orders of the shafts."""
     result, lane, variable = motion.result, motion.lane, motion.variable
     history = panels["h"]
-    response.time_history(history, result, lane, variable, between=motion.shown)
+    in_periods = motion.teeth > 0
+    response.time_history(
+        history, result, lane, variable, between=motion.shown, in_periods=in_periods
+    )
     if response.element_of(result, variable):
-        response.contact_strip(history, result, lane, variable)
+        response.contact_strip(history, result, lane, variable, in_periods=in_periods)
     few_ticks(history, None if motion.teeth else 6, 6)
     remark(panels["e" if motion.teeth else "h"], in_words(result, place_of(result, lane)))
     if motion.whole:
         _draw_phase_plane(panels["p"], panels["s"], motion)
     transformed = acceleration_of(variable) if motion.whole else variable
-    look: dict[str, Any] = {"highest": HIGHEST_ORDER} if motion.teeth else {}
+    look: dict[str, Any] = {"highest": HIGHEST_ORDER, "in_orders": True} if motion.teeth else {}
     lines = response.amplitude_spectrum(panels["f"], result, lane, transformed, **look)
     if motion.teeth:
         _pitch_error_above(panels["e"], history, motion)
@@ -175,7 +178,7 @@ def _draw_phase_plane(portrait: Axes, section: Axes, motion: _Motion) -> None:
         number = repeats // motion.excitation.excitation_period
         period = f"period {number} of the excitation, {repeats} mesh periods"
         remark(section, period if repeats else "")
-        late_curve = np.array(curve.get_data())[:, result[TIME] >= first]
+        late_curve = np.array(curve.get_data())[:, response.mesh_periods(result) >= first]
         portrait.plot(*late_curve, "k", linewidth=0.4)
         curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
     else:
@@ -192,7 +195,8 @@ def _pitch_error_above(top: Axes, history: Axes, motion: _Motion) -> None:
     revolution.
     """
     between = history.get_xlim()
-    response.time_history(top, motion.result, motion.lane, MESH_ERROR, between=between)
+    periods: dict[str, Any] = {"between": between, "in_periods": True}
+    response.time_history(top, motion.result, motion.lane, MESH_ERROR, **periods)
     top.sharex(history)
     few_ticks(top, None, 4)
     teeth = motion.teeth

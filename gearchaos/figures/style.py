@@ -9,6 +9,8 @@ from typing import Any
 
 import matplotlib as mpl
 
+from gearchaos.errors import FigureError
+
 SINGLE_COLUMN_MM = 85.0
 DOUBLE_COLUMN_MM = 180.0
 MM_PER_INCH = 25.4
@@ -53,6 +55,26 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(
         before=DRAWING.acquire, after_in_parent=DRAWING.release, after_in_child=DRAWING.release
     )
+
+
+@contextmanager
+def with_font(name: str | None) -> Iterator[None]:
+    """Set the font of all texts but formulae within a context; None leaves it unchanged.
+
+    Raises FigureError if matplotlib does not find the font.
+    """
+    if name is None:
+        yield
+        return
+    from matplotlib.font_manager import findfont
+
+    try:
+        findfont(name, fallback_to_default=False)
+    except ValueError:
+        rule = "is no font that matplotlib finds; install it, or give another one"
+        raise FigureError(f"--font {name}: {rule}, such as DejaVu Sans") from None
+    with mpl.rc_context({"font.family": name}):
+        yield
 
 
 @contextmanager

@@ -247,9 +247,10 @@ TIME_PART = Part(
         ),
         Output(
             names.MESH_PERIOD,
-            "mesh period in units of dimensionless time",
+            "mesh period",
             r"$2\pi/\Omega$",
             fill_value=None,
+            scale=Quantity.TIME,
         ),
     ),
     in_time=True,

@@ -18,6 +18,7 @@ class Quantity(Enum):
     ACCELERATION = auto()
     FORCE = auto()
     GROWTH_RATE = auto()
+    TIME = auto()
     MESH_FREQUENCY = auto()
     ANGLE = auto()
     ANGULAR_SPEED = auto()
@@ -38,6 +39,8 @@ class Scale:
         The numbers are multiplied by this factor and by all ``parameters``.
     parameters : tuple of str
         Names of the parameters of a result that the scale is a product of. A name may occur twice.
+    per : tuple of str
+        Names of the parameters by which the numbers are divided.
     long_name, symbol : str
         What the variable is called in physical units. Empty: it keeps its name.
     remedy : str
@@ -48,6 +51,7 @@ class Scale:
     units: str = "1"
     factor: float = 1.0
     parameters: tuple[str, ...] = ()
+    per: tuple[str, ...] = ()
     long_name: str = ""
     symbol: str = ""
     remedy: str = ""
@@ -85,10 +89,16 @@ def scales_of(
             f"unit ${b_symbol}{omega_symbol}^2$", "m/s^2", micro, (b, omega, omega)
         ),
         Quantity.FORCE: Scale(f"unit ${k_symbol}{b_symbol}$", "N", micro, (k, b)),
+        Quantity.TIME: Scale(f"unit $1/{omega_symbol}$", "s", 1.0, per=(omega,)),
         Quantity.GROWTH_RATE: Scale(r"per unit of $\tau$", "s^-1", 1.0, (omega,)),
         # The angular frequency in multiples of the scale becomes an ordinary frequency.
         Quantity.MESH_FREQUENCY: Scale(
-            f"unit ${omega_symbol}$", "Hz", 0.5 / np.pi, (omega,), "mesh frequency", "$f$"
+            f"unit ${omega_symbol}$",
+            "Hz",
+            0.5 / np.pi,
+            (omega,),
+            long_name="mesh frequency",
+            symbol="$f$",
         ),
     }
     return MappingProxyType(

@@ -42,13 +42,18 @@ def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended)
     assert names_in(folder) == [f"pan2021_first_accuracy.{end}" for end in ("pdf", "png")]
 
 
-def test_existing_files_are_kept_unless_overwriting_is_asked_for(ended):
-    folder = ended[1]
-    before = (folder / "pan2021_first_accuracy.png").read_bytes()
-    again = run_module("gearchaos.accuracy", str(PAN2021), *SHORT, cwd=folder)
-    assert again.code == 4
-    assert "--overwrite" in again.err
-    assert (folder / "pan2021_first_accuracy.png").read_bytes() == before
+def test_other_files_are_kept_and_figures_of_the_command_are_replaced(ended, tmp_path):
+    other = tmp_path / "mine_accuracy.png"
+    other.write_bytes(b"not a figure of this command")
+    few = ("--set", "integration.transient_periods=20", *PLAIN, "--steps", "100", "--lanes", "3")
+    few += ("--output", str(tmp_path / "mine_accuracy"))
+    again = run_module("gearchaos.accuracy", str(PAN2021), *few, cwd=tmp_path)
+    assert again.code == 4 and "--overwrite" in again.err
+    assert other.read_bytes() == b"not a figure of this command"
+    own = ended[1] / "pan2021_first_accuracy.png"
+    other.write_bytes(own.read_bytes())
+    assert run_module("gearchaos.accuracy", str(PAN2021), *few, cwd=tmp_path).code == 0
+    assert other.read_bytes() != own.read_bytes()
 
 
 @pytest.mark.parametrize("steps", ["0", "x", "", "100000"])

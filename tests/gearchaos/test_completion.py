@@ -39,7 +39,7 @@ def test_bash_completes_commands_options_choices_and_files(complete, capsys):
     assert main(["completion", "bash"]) == 0
     script = capsys.readouterr().out
     assert complete(script, "") >= set(COMMANDS)
-    assert complete(script, "s") == {"schema", "stages", "sweep"}
+    assert complete(script, "s") == {"schema", "shares", "stages", "sweep"}
     assert complete(script, "sweep", "--") >= SWEEP_OPTIONS
     assert complete(script, "plot", "pair.h5", "--units", "p") == {"physical"}
     assert complete(script, "sweep", "pair.t") == {"pair.toml"}

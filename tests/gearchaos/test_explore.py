@@ -24,7 +24,7 @@ from gearchaos_kernels import Status
 import gearchaos
 from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
-from gearchaos.explore import main
+from gearchaos.explore import PORTS, _free_port, main
 
 from .commands import HANGS, small_config
 
@@ -343,10 +343,13 @@ def test_what_is_wrong_is_reported_in_a_sentence(path, tmp_path, monkeypatch, ca
 
     code, text = said(str(tmp_path / "none.h5"))
     assert code == 4 and "none.h5: cannot be read" in text
+    with socket.create_server(("127.0.0.1", 65535)):
+        code, text = said(str(path), "--port", "65535")
+    assert code == 2 and "--port 65535: Address already in use; choose another port" in text
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = str(taken.getsockname()[1])
-        code, text = said(str(path), "--port", port)
-    assert code == 2 and f"--port {port}: Address already in use; choose another port" in text
+        port = taken.getsockname()[1]
+        assert port < _free_port("127.0.0.1", port) < port + PORTS
+    assert f"port {port} is in use" not in capsys.readouterr().err
     lane_of(path, pitch_error=1.0, direction="upwards")[1].save(tmp_path / "response.h5")
     code, text = said(str(tmp_path / "response.h5"))
     assert code == 2 and "is a response; python -m gearchaos.plot draws it" in text

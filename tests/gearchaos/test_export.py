@@ -4,13 +4,22 @@ import sys
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.export import main
+from gearchaos.figures import amplitude_spectrum, time_history
+from gearchaos.figures.response import spectrum_of
 from gearchaos.results.reading.result import open_result
 
+from .commands import LINEAR, run_module, small_config
 from .test_result_axes import AXES, result_over
 
+SCALED = {
+    "section_delta_5": " [b']",
+    "lyapunov_exponent": " [per unit of tau]",
+    "lyapunov_exponent_standard_error": " [per unit of tau]",
+}
 RESULT = result_over(AXES["two parameters, several starts"])
 
 
@@ -75,9 +84,15 @@ def test_tables_as_files_come_back_as_they_were(path, ending, along, capsys):
     else:
         read = pandas.read_parquet(target).reset_index()
     wanted = RESULT.to_dataframe(*along).reset_index()
-    assert list(read.columns) == list(wanted.columns)
-    for name in wanted:
-        np.testing.assert_array_equal(read[name].to_numpy(), wanted[name].to_numpy())
+    # In a CSV file every column of numbers has its unit.
+    units = {name: "" if RESULT.variables[name].flags else " [1]" for name in wanted}
+    units = {
+        name: SCALED.get(name, unit) if ending == "csv" else "" for name, unit in units.items()
+    }
+    assert list(read.columns) == [f"{name}{unit}" for name, unit in units.items()]
+    for name, unit in units.items():
+        column = read[f"{name}{unit}"].to_numpy()
+        np.testing.assert_array_equal(column, wanted[name].to_numpy())
 
 
 def test_matlab_gets_every_array_by_its_name(path):
@@ -119,3 +134,67 @@ def test_a_package_that_is_missing_is_named_with_the_remedy(
 def test_a_notebook_shows_a_table_of_the_variables():
     shown = RESULT._repr_html_()
     assert shown.count("<tr>") == len(RESULT) and "&lt;Result" in shown
+
+
+@pytest.fixture(scope="module")
+def motion(tmp_path_factory):
+    """Compute a response of the small pair as a user does."""
+    folder = tmp_path_factory.mktemp("motion")
+    small_config(folder)
+    given = ("gears.toml", "--at", "2.0", "--periods", "6", *LINEAR)
+    assert run_module("gearchaos.response", *given, cwd=folder).code == 0
+    return folder / "gears_response.h5"
+
+
+def exported(motion, capsys, *arguments: str):
+    pandas = pytest.importorskip("pandas")
+    target = motion.with_name("table.csv")
+    assert main([str(motion), str(target), "--overwrite", *arguments]) == 0
+    return pandas.read_csv(target), capsys.readouterr().err
+
+
+def test_a_response_is_exported_over_time_in_seconds(motion, capsys):
+    result = open_result(motion)
+    table, said = exported(motion, capsys)
+    # 8000 rpm and 21 teeth: 2800 mesh periods a second.
+    np.testing.assert_allclose(table["time [s]"], result["time"] / 2800.0, rtol=1e-12)
+    # The length scale is 25 um.
+    np.testing.assert_allclose(table["delta_5 [um]"], 25.0 * result["delta_5"][0], rtol=1e-12)
+    assert {"delta_5_rate [m/s]", "mesh_force_tangential [N]", "contact_tangential"} <= {*table}
+    assert f"{result['time'].size} rows" in said
+    table, _ = exported(motion, capsys, "--units", "dimensionless")
+    np.testing.assert_allclose(table["delta_5 [b']"], result["delta_5"][0], rtol=1e-14)
+    assert {"time [1]", "delta_5_rate [b' omega_h]", "mesh_force_tangential [k_m b']"} <= {*table}
+    lanes, said = exported(motion, capsys, "--along", "lane")
+    assert len(lanes) == 1 and "1 row of" in said
+
+
+def test_spectra_are_exported_over_hertz(motion, capsys):
+    table, _ = exported(motion, capsys, "--spectrum")
+    lines = table["frequency [Hz]"].to_numpy()
+    # Lines are as far apart as six mesh periods are long.
+    assert lines[1] == pytest.approx(2800.0 / 6.0) and lines[6] == pytest.approx(2800.0)
+    result = open_result(motion)
+    order, amplitude, _ = spectrum_of(result, 0, "delta_5")
+    # The rounding of a transform is in proportion to its largest line.
+    exact = {"rtol": 0.0, "atol": 1e-13 * 25.0 * amplitude.max()}
+    np.testing.assert_allclose(table["amplitude_delta_5 [um]"], 25.0 * amplitude, **exact)
+    np.testing.assert_allclose(lines, 2800.0 * order, rtol=1e-10)
+    assert main([str(motion), str(motion.with_suffix(".mat")), "--spectrum"]) == 2
+    assert "--spectrum: writes a table of a response" in capsys.readouterr().err
+
+
+def test_a_history_and_a_spectrum_are_drawn_in_ms_and_khz(motion):
+    result = open_result(motion).physical()
+    history, spectrum = Figure().subplots(1, 2)
+    line = time_history(history, result, 0)
+    np.testing.assert_allclose(line.get_xdata(), 1e3 * result["time"], rtol=1e-12)
+    assert history.get_xlabel() == "Time, $t$ (ms)"
+    amplitude_spectrum(spectrum, result, 0)
+    assert spectrum.get_xlabel() == "Frequency, $f$ (kHz)"
+    # Eight mesh orders.
+    assert spectrum.get_xlim()[1] == pytest.approx(1.02 * 8 * 2.8)
+    assert result["mesh_period"] == pytest.approx(1.0 / 2800.0)
+    force = time_history(Figure().subplots(), result, 0, "mesh_force_tangential")
+    assert force.axes.get_ylabel().endswith("(kN)")
+    np.testing.assert_allclose(1e3 * force.get_ydata(), result["mesh_force_tangential"][0])

@@ -27,6 +27,18 @@ def test_factors_are_those_of_the_static_force_in_the_direction_of_the_load():
     assert reported["transmission_error_rms"] == pytest.approx([0.5] * 3)
 
 
+def test_the_record_is_raised_to_whole_cycles_of_the_orders():
+    run = simulation("outputs.orders=['1/3', '1/2', 1, 2]", "integration.recorded_periods=500")
+    assert run.plan.recorded_periods == 504
+    assert any("recorded_periods raised from 500 to 504: whole" in note for note in run.notes)
+    assert simulation("outputs.orders=['1/3', 2]").plan.recorded_periods == 12
+    with pytest.raises(gearchaos.GearchaosError, match="orders: 48: must have more than two"):
+        simulation("outputs.orders=[1, 48]")
+    primes = ["1/41", "1/43", "1/47"]
+    with pytest.raises(gearchaos.GearchaosError, match="a record of 82861 mesh periods"):
+        simulation(f"outputs.orders={primes}")
+
+
 def test_a_sweep_reports_them_and_its_file_keeps_them(tmp_path):
     lengths = ("integration.transient_periods=60", "sweep.count=6")
     asked = (*SHORT, "outputs.loads=true", "outputs.contact=true", *lengths, *AXIAL)

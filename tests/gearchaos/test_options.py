@@ -106,6 +106,13 @@ def test_a_wrong_argument_is_one_line_with_the_rule_and_the_remedy(arguments, me
     assert "\n" not in line
 
 
+@pytest.mark.parametrize("flag", ["--number", "--word", "--counts"])
+def test_an_option_with_one_value_is_given_once(flag):
+    values = {"--number": "3", "--word": "blue", "--counts": "2"}
+    with pytest.raises(ConfigurationError, match=f"{flag}: is given twice; it takes one value"):
+        read("f", flag, values[flag], flag, values[flag])
+
+
 def test_a_word_that_is_no_choice_is_refused_with_the_choices():
     with pytest.raises(ConfigurationError, match=r"argument --word: .*'green'.*red.*blue"):
         read("a", "--word", "green")

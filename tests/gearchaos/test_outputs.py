@@ -215,7 +215,8 @@ UNITS = {
     "s^-1": "lyapunov_exponent lyapunov_exponent_standard_error lyapunov_exponents lyapunov_sum "
     "lyapunov_exponents_standard_error exponent_step_error",
     "Hz": "mesh_frequency",
-    "1": "status period time mesh_period return_distance section_error start_state end_state "
+    "s": "mesh_period",
+    "1": "status period time return_distance section_error start_state end_state "
     "crossings_per_period time_driving_axial impacts_back_axial load_factor_rms order exponent "
     "load_factor_largest contact_tangential damping_ratio nothing_of_the_kind",
 }

@@ -71,7 +71,7 @@ def test_a_table_says_its_units(path, tmp_path):
     read, frame = pandas.read_csv(target), gearchaos.open_result(path).physical().to_dataframe()
     name = "mesh_force_largest_tangential"
     np.testing.assert_array_equal(read[f"{name} [N]"], frame[name])
-    assert frame.attrs["units"][name] == "N" and "period" in read.columns
+    assert frame.attrs["units"][name] == "N" and "period [1]" in read.columns
 
 
 def test_lengths_times_and_forces_are_those_of_the_pair(result):

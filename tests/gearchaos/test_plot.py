@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -246,3 +247,33 @@ def test_version_and_help_answer_on_stdout(capsys):
     assert capsys.readouterr().out.startswith("gearchaos ")
     assert main(["--help"]) == 0
     assert "RESULT.h5" in capsys.readouterr().out
+
+
+def test_every_variable_has_a_figure_of_its_own(result_file, tmp_path, capsys):
+    names = ("section_delta_5", "lyapunov_exponent")
+    asked = [word for name in names for word in ("--variable", name)]
+    assert main([str(result_file), *asked, "--output", str(tmp_path / "all.png")]) == 0
+    written = capsys.readouterr().out.splitlines()
+    assert written == [str(tmp_path / name) for name in ("all.png", "all_lyapunov_exponent.png")]
+    assert len({Path(name).read_bytes() for name in written}) == 2
+
+
+def test_title_labels_and_font_are_chosen_and_a_drawing_keeps_its_text(
+    result_file, tmp_path, capsys
+):
+    shutil.copy(result_file, tmp_path / "other.h5")
+    target = tmp_path / "both.svg"
+    words = ("--label", "my first", "--label", "my second", "--title", "Pair $ 7")
+    asked = (str(tmp_path / "other.h5"), *words, "--font", "DejaVu Sans", "-o", str(target))
+    assert main([str(result_file), *asked]) == 0
+    drawing = target.read_text(encoding="utf-8")
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawing)
+    assert {"my first", "my second", "Pair $ 7"} <= {*texts}
+    (style,) = re.findall(r'<text style="([^"]*)"[^>]*>my first<', drawing)
+    assert "DejaVu Sans" in style
+    for wrong, message in {
+        ("--font", "No Such Font"): "--font No Such Font: is no font that matplotlib finds",
+        ("--label", "one", "--label", "two"): "--label: is given 2 times for 1 results",
+    }.items():
+        assert main([str(result_file), *wrong]) == 2
+        assert message in capsys.readouterr().err

@@ -1,5 +1,8 @@
 """Shares of the gear pairs that move in the same way: counted, with their confidence, and drawn."""
 
+import csv
+import json
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +22,7 @@ from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.ensembles import motion_shares
 from gearchaos.results.reading.result import Result
+from gearchaos.shares import main as shares_main
 
 from .listed_variables import sweep_variables
 
@@ -251,3 +255,40 @@ def test_what_the_command_cannot_draw_is_a_usage_error(path, arguments, message,
 def test_two_results_have_no_common_shares(path, capsys):
     assert main([str(path), str(path), "--shares"]) == 2
     assert "and here is a figure of shares" in capsys.readouterr().err
+
+
+def printed(path, capsys, *arguments: str) -> str:
+    assert shares_main([str(path), *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_command_prints_shares_with_their_intervals(tmp_path, capsys):
+    path = tmp_path / "grades.h5"
+    result = known_motions()
+    result.save(path)
+    counted = motion_shares(result)
+    lines = printed(path, capsys).splitlines()
+    assert lines[0] == "shares over pitch_error_grade"
+    # Of the twenty lanes at the first value all have period 1 and keep contact.
+    cells = re.split(r"\s\s+", lines[-3].strip())
+    assert cells == ["5", "20", *["100.0% (83.9% to 100.0%)"] * 2]
+    facts = json.loads(printed(path, capsys, "--json"))
+    table = [*csv.DictReader(printed(path, capsys, "--csv").splitlines())]
+    assert facts["unit"] == "1" and len(facts["values"]) == len(table) == 3
+    for at, (one, row) in enumerate(zip(facts["values"], table, strict=True)):
+        assert float(row["pitch_error_grade [1]"]) == one["value"] == counted.values[at]
+        assert one["not_period_1"]["share"] == counted.other.shares[at]
+        assert one["loses_contact"]["share_95_percent"] == counted.apart.intervals[at].tolist()
+        assert float(row["period 1 [1]"]) == pytest.approx(1.0 - counted.other.shares[at])
+        kept = 1.0 - counted.apart.intervals[at, ::-1]
+        bounds = [float(row[f"keeps contact, 95 % {end} [1]"]) for end in ("from", "to")]
+        assert bounds == pytest.approx(kept.tolist())
+        assert sum(one["lanes_by_motion"].values()) == PAIRS * STARTS
+    assert shares_main([str(path), "--json", "--csv"]) == 2
+    assert "--json and --csv: print one of the two" in capsys.readouterr().err
+
+
+def test_the_command_words_what_has_no_shares(tmp_path, capsys):
+    known_motions().sel(realisation=0, start=0).save(tmp_path / "single.h5")
+    assert shares_main([str(tmp_path / "single.h5")]) == 2
+    assert "set pitch_error.realisations or start.count" in capsys.readouterr().err

@@ -21,6 +21,7 @@ from gearchaos.results.reading.stage_table import (
     slice_facts,
     stage_table,
 )
+from gearchaos.stages import band_lines
 
 from .test_result_axes import AXES, ERRORS, LOADS, result_over
 
@@ -51,6 +52,20 @@ def test_equal_neighbours_form_a_stage():
     assert [stage.lanes for stage in stages] == [3, 3, 2]
     assert [stage.period for stage in stages] == [1, 0, 2]
     assert (stages[1].lowest_exponent, stages[1].highest_exponent) == (0.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("bands", "text"),
+    [
+        ({12: 1}, "the only chaotic lane is on 12 bands"),
+        ({2: 3}, "all 3 chaotic lanes on 2 bands"),
+        ({1: 4, 2: 3}, "of 7 chaotic lanes 3 on 2 bands"),
+        ({1: 4}, None),
+    ],
+)
+def test_bands_are_counted_in_a_sentence(bands, text):
+    stage = Stage(0, 1, 2.0, 3.0, "chaotic", 0, 0.1, 0.2, sum(bands.values()), bands)
+    assert [*band_lines([stage])] == ([f"2 to 3: {text}"] if text else [])
 
 
 def test_one_lane_is_one_stage():

@@ -141,9 +141,17 @@ def test_a_dry_run_reports_to_a_scheduler_as_json_what_one_shard_takes(tmp_path)
     assert facts["seconds"] > 0.0
     # Not only arrays: nobody starts with less than the interpreter and its packages take.
     assert facts["memory_bytes"] > 5e7
+
+
+def test_a_sweep_reports_its_result_as_json(tmp_path):
     ended = sweep(tmp_path, "--json")
-    assert (ended.code, ended.out) == (2, "")
-    assert "--json: needs --dry-run; the result of a sweep is an HDF5 file" in ended.err
+    assert ended.code == 0
+    facts = json.loads(ended.out)
+    assert facts["output"] == "gears.h5" and facts["lanes"] == 40 and facts["diverged"] == 0
+    assert facts["steps_per_period"] == facts["recorded_periods"] * 4 == 40
+    assert facts["method"] == "rk4" and "40 lanes, 0 diverged" in facts["remarks"][0]
+    again = sweep(tmp_path, "--json", "--resume")
+    assert json.loads(again.out)["remarks"] == ["complete already: 40 lanes, 0 diverged"]
 
 
 def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):

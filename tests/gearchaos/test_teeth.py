@@ -205,3 +205,17 @@ def test_an_excitation_that_hardly_ever_repeats_is_refused():
     many = {**TABLES["pair"], "teeth": [1999, 2000]}
     with pytest.raises(gearchaos.ConfigurationError, match="after 3998000 mesh periods only"):
         gearchaos.run(configured(pair=many, pitch_error=GRADES))
+
+
+def test_a_response_may_keep_every_period_of_a_record_that_the_teeth_raised():
+    lengths = {"transient_periods": 1, "recorded_periods": 50}
+    config = configured(
+        integration=lengths,
+        sweep={"parameter": "pitch_error", "values": [0.5]},
+        outputs={"section_points": 5},
+    )
+    motion = gearchaos.respond(config, periods=60)
+    # 50 periods are raised to three turns of the 21 teeth.
+    assert motion["time"][-1] == 60.0 and motion.metadata["recorded_periods"] == 63
+    assert motion["section_point"].size == 63
+    assert "integration.recorded_periods raised from 50 to 63" in motion.metadata["notes"]

@@ -2,6 +2,7 @@
 
 import json
 import os
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.provenance import SOFTWARE
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.errors import ConfigurationError
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
 from gearchaos.models import Configuration, load_config
@@ -132,10 +134,10 @@ def test_the_first_number_moves_the_row_of_gears():
 
 COLUMNS = {
     "semicolons": "tooth;Fp\n" + "".join(f"{n};{f}\n" for n, f in enumerate(F)),
-    "commas, notes and spaces": "# drawn\n\ntooth , Fp\n" + "".join(f"0 , {f} \n" for f in F),
-    "tabs": "Fp\ttooth\n" + "".join(f"{f}\t0\n" for f in F),
+    "commas, notes and spaces": "# drawn\n\nx , Fp\n" + "".join(f"0 , {f} \n" for f in F),
+    "tabs": "Fp\ttooth\n" + "".join(f"{f}\t{n}\n" for n, f in enumerate(F)),
     "one column": "Fp\r\n" + "".join(f"{f}\r\n" for f in F),
-    "quotes": '"tooth","Fp"\n' + "".join(f'"a, b","{f}"\n' for f in F),
+    "quotes": '"note","Fp"\n' + "".join(f'"a, b","{f}"\n' for f in F),
     "beside a longer one": "g,p,Fp\n" + "".join(f"0,1,{f}\n" for f in F) + "0,2,\n0\n",
     "a byte order mark": "\ufeffFp;x\n" + "".join(f"{f};\n" for f in F),
 }
@@ -200,7 +202,20 @@ FAULTY_FILES = {
         ROWS.replace("4.0", "1e999"),
         "line 3, column Fp: must be a finite number; give",
     ),
-    "decimal comma": (ROWS.replace("Fp", "x;Fp").replace("4.0", "0;4,0"), "decimals with a point"),
+    "decimal comma": (ROWS.replace("Fp", "x,Fp").replace("4.0", '0,"4,0"'), "must be a finite"),
+    "twice": ("Fp;Fp\n1;2\n", 'has several columns "Fp"; rename all but one of them'),
+    "missing number": (
+        "Zahn;Fp\n1;0,0\n2;1,0\n4;1,0\n5;2,0\n6;2,0\n",
+        "column Zahn: must hold 0 to n - 1 or 1 to n, each once, and 3 is missing",
+    ),
+    "number twice": (
+        "No;Fp\n1;0.0\n2;1.0\n2;1.0\n4;2.0\n5;2.0\n",
+        "column No: must hold 0 to n - 1 or 1 to n, each once, and 2 is there more than once",
+    ),
+    "numbers from 2": (
+        "No;Fp\n2;0.0\n3;1.0\n4;1.0\n5;2.0\n6;2.0\n",
+        "each once, and 1 is missing",
+    ),
     "short row": (
         "x;Fp\n1;0.0\n\n2\n3;1.0\n",
         "line 4, column Fp: must be a finite number; give",
@@ -437,3 +452,50 @@ def test_files_of_before_are_files_of_a_sine():
     config = Configuration.from_toml(SMALL)
     assert config.pitch_error.kind == "sine" and config.pitch_error.phase_deg == 30.0
     assert Configuration.from_toml(config.resolved_toml()) == config
+
+
+SHEET = """\ufeffInspection report;gear 4711
+Messung;12.03.;
+Teilungsabweichungen in µm;;
+
+Zahn-Nr.;Fp rechts;Fp links
+;µm;µm
+{rows}
+Fp;21,5;20,1
+"""
+
+
+def sheet(order, begin: int, mark: str = ";") -> str:
+    """Write an inspection sheet with the teeth in an order, and numbers that begin with 0 or 1."""
+    rows = (f"{k + begin};{F[k]:.1f};{-F[k]:.1f}".replace(".", ",") for k in order)
+    return SHEET.format(rows="\n".join(rows)).replace(";", mark)
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+@pytest.mark.parametrize("begin", [0, 1])
+def test_an_inspection_sheet_is_read_as_it_comes(begin, mark, tmp_path):
+    # Rows in another order are put in the order of the tooth numbers.
+    text = sheet([2, 0, 4, 1, 3], begin, mark)
+    (tmp_path / "sheet.csv").write_text(text, encoding="utf-8")
+    path = tmp_path / "gears.toml"
+    for column, sign in (("Fp rechts", 1.0), ("Fp links", -1.0)):
+        path.write_text(driving('file = "sheet.csv"', f'column = "{column}"'))
+        found = load_config(path).pitch_error.driving.cumulative_um
+        assert found == pytest.approx([sign * round(f, 1) for f in F])
+    # A column of tooth numbers with any heading is named.
+    (tmp_path / "sheet.csv").write_text(text.replace("Zahn-Nr.", "dent"), encoding="utf-8")
+    keys = ('file = "sheet.csv"', 'column = "Fp rechts"', 'tooth_column = "dent"')
+    path.write_text(driving(*keys))
+    assert load_config(path).pitch_error.driving.cumulative_um == pytest.approx(
+        [round(f, 1) for f in F]
+    )
+
+
+def test_what_was_understood_is_a_note_before_the_sweep():
+    path = Path(__file__).resolve().parents[2] / "sweeps" / "inspection.toml"
+    notes = plan_run(load_config(path)).notes
+    driving_note, driven_note = (note for note in notes if "gear:" in note)
+    # The gears of the file just pass grade 7.
+    assert driving_note.startswith("driving gear: 21 teeth of inspection.csv, column driving")
+    assert driving_note.endswith("single deviation 10.5 um: grade 7 of ISO 1328-1:1995")
+    assert driven_note.endswith("grade 7 of ISO 1328-1:1995") and "38 teeth" in driven_note

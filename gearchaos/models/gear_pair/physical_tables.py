@@ -155,6 +155,9 @@ class GearDeviations(Table):
     single_um: Numbers | None = _optional("single deviations: each from the tooth before it", "um")
     file: str | None = _optional("CSV file instead of a list, relative to the configuration")
     column: str | None = _optional("heading of the column to take", example="Fp")
+    tooth_column: str | None = _optional(
+        "heading of the tooth numbers, by default a column such as tooth, Zahn or No", example="No"
+    )
     holds: Literal["cumulative", "single"] = key("content of the column", default="cumulative")
     counted: Literal["with_rotation", "against_rotation"] = key(default="with_rotation")
     """direction in which teeth are counted and deviations positive"""

@@ -25,6 +25,11 @@ from gearchaos.models.gear_pair.tooth_deviations import counted_deviations, toot
 LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
 """Keys of the lists of deviations by what a column holds."""
 
+_IN_ENGLISH = ("tooth", "tooth no", "tooth number", "no", "number")
+_IN_GERMAN = ("zahn", "zahn nr", "zahn-nr", "zahnnr", "zahnnummer", "nr", "nummer")
+TOOTH_HEADINGS = frozenset((*_IN_ENGLISH, *_IN_GERMAN))
+"""Headings of tooth numbers, in small letters and without a point at the end."""
+
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys that change the drawn gears, but no group."""
 
@@ -52,11 +57,23 @@ def with_deviation_files(
         try:
             if not isinstance(files.get(name), str):
                 files[name] = text_beside(folder, name, "file of pitch deviations")
-            table[read] = CsvText(files[name]).column(table.get("column"), "tooth")
+            table[read] = _column(files[name], table)
             tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
         except (GearchaosError, ValueError, csv.Error) as fault:
             faults.append(fault_of(f"pitch_error.{gear}.file", fault, name))
     return tables, faults
+
+
+def _column(text: str, table: Mapping[str, Any]) -> list[float]:
+    """Return the deviations in the text of an inspection sheet, in the order of the teeth."""
+    name, numbers = table.get("column"), table.get("tooth_column")
+    sheet = CsvText(text, decimal_comma=True, heading=name)
+    if not isinstance(numbers, str):
+        known = [one for one in sheet.headings if one.lower().rstrip(".") in TOOTH_HEADINGS]
+        numbers = known[0] if len(known) == 1 and known[0] != name else None
+    if numbers is None:
+        return sheet.column(name, "tooth")
+    return sheet.numbered_column(name, numbers, "tooth")
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:

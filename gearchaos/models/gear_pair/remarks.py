@@ -7,9 +7,22 @@ import numpy as np
 from gearchaos_kernels import GearPairs, Teeth
 
 from gearchaos.arrays import Floats
-from gearchaos.models.gear_pair.derivation import LENGTH
-from gearchaos.models.gear_pair.tables import GearPairTables
+from gearchaos.iso1328 import cumulative_pitch_um as cumulative_um
+from gearchaos.iso1328 import single_pitch_um
+from gearchaos.models.gear_pair.derivation import LENGTH, Quantities
+from gearchaos.models.gear_pair.physical_tables import Pair, TeethError
+from gearchaos.models.gear_pair.tables import GearPairTables, physical_at
+from gearchaos.models.gear_pair.tooth_deviations import counted_deviations
 from gearchaos.models.stiffness_table import note_of, tables_in
+
+MOST_MODULES = 100.0
+"""Largest usual face width in modules."""
+
+MOST_DISCS = 20.0
+"""Largest usual mass or inertia over that of a solid disc, and of the disc over it."""
+
+OF_DISCS = {"masses_kg": "kg", "inertias_kg_m2": "kg m^2"}
+"""Keys of [pair] that replace a quantity of solid discs, and their units."""
 
 
 def remarks(
@@ -20,6 +33,7 @@ def remarks(
     ``system``: lanes spread over the sweep; ``parameters``: values of the groups and scales by
     name, as a result keeps them.
     """
+    yield from _inspected(config)
     if system.repeats_after > 1:
         yield _parting_pairs(system)
         yield _printed_gaps(config)
@@ -27,6 +41,41 @@ def remarks(
         yield note_of(path, table)
     yield _negative_stiffness(system)
     yield _mistaken_units(config, system.repeats_after > 1, parameters)
+
+
+def _inspected(config: GearPairTables) -> Iterator[str]:
+    """Yield what was understood of the measured deviations of each gear."""
+    error, pair = config.pitch_error, config.pair
+    if not isinstance(error, TeethError) or pair is None:
+        return
+    for name, teeth in zip(("driving", "driven"), pair.teeth, strict=True):
+        gear = getattr(error, name)
+        if gear is None:
+            continue
+        found = counted_deviations(gear)
+        single = float(np.abs(found - np.roll(found, 1)).max())
+        spread = float(np.ptp(found))
+        source = f" of {gear.file}, column {gear.column}" if gear.file else ""
+        holds = "single" if gear.cumulative_um is None else "cumulative"
+        grade = _grade_of(single, spread, pair, teeth)
+        yield (
+            f"{name} gear: {teeth} teeth{source}, {holds} deviations; their range is "
+            f"{spread:.4g} um and the largest single deviation {single:.4g} um: {grade}"
+        )
+
+
+def _grade_of(single: float, spread: float, pair: Pair, teeth: int) -> str:
+    """Return the best accuracy grade of ISO 1328-1:1995 that a gear passes, in words."""
+    module = pair.normal_module_mm
+    diameter = teeth * module / math.cos(math.radians(pair.helix_angle_deg))
+    try:
+        for grade in range(1, 13):
+            limits = (limit(grade, module, diameter) for limit in (single_pitch_um, cumulative_um))
+            if all(one <= most for one, most in zip((single, spread), limits, strict=True)):
+                return f"grade {grade} of ISO 1328-1:1995"
+    except ValueError:
+        return "outside the ranges of ISO 1328-1:1995"
+    return "worse than grade 12 of ISO 1328-1:1995"
 
 
 def _printed_gaps(config: GearPairTables) -> str:
@@ -75,7 +124,8 @@ def _largest_spread(teeth: Teeth) -> Floats:
 def _mistaken_units(config: GearPairTables, teeth: bool, parameters: Mapping[str, Floats]) -> str:
     """Return which lengths do not suit the module, as those in another unit do not."""
     pair, found = config.pair, []
-    if pair is None or not pair.normal_module_mm:
+    meant = "pair.normal_module_mm" in config.unusual
+    if pair is None or not pair.normal_module_mm or meant:
         return ""
     error = () if teeth else ("pitch_error", "pitch_error_amplitude", LENGTH)
     bending = ("load", LENGTH, "base_helix_angle_deg")
@@ -83,10 +133,41 @@ def _mistaken_units(config: GearPairTables, teeth: bool, parameters: Mapping[str
         if names and {*names} <= {*parameters}:
             um = math.prod(_largest_factor(name, parameters[name]) for name in names)
             found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
-    if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
-        found.append(f"face width {pair.face_width_mm:g} mm")
+    module, width = pair.normal_module_mm, pair.face_width_mm
+    wide = "pair.face_width_mm" in config.unusual
+    if width and not wide and not module <= width <= MOST_MODULES * module:
+        found.append(f"face width {width:g} mm")
+    found += _large_backlash(config, parameters)
+    found += _unlike_discs(config)
     rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
     return f"{', '.join(found)}: {rule} the keys?" if found else ""
+
+
+def _large_backlash(config: GearPairTables, parameters: Mapping[str, Floats]) -> Iterator[str]:
+    """Yield the half backlash if it exceeds a quarter of the module: teeth have no such gaps."""
+    names = ("half_backlash", LENGTH)
+    if config.pair is not None and {*names} <= {*parameters}:
+        um = math.prod(_largest_factor(name, parameters[name]) for name in names)
+        meant = any("backlash" in path for path in config.unusual)
+        if um > 250.0 * config.pair.normal_module_mm and not meant:
+            yield f"half backlash {um:.4g} um"
+
+
+def _unlike_discs(config: GearPairTables) -> Iterator[str]:
+    """Yield given masses and inertias that are far from those of solid discs."""
+    if config.pair is None:
+        return
+    physical = physical_at(config, {})
+    discs = Quantities(physical | {f"pair.{name}": None for name in OF_DISCS}).pair
+    for name, units in OF_DISCS.items():
+        given = getattr(config.pair, name)
+        if given is None or f"pair.{name}" in config.unusual:
+            continue
+        solid = getattr(discs, name.partition("_")[0])
+        ratios = [float(one / np.asarray(disc)) for one, disc in zip(given, solid, strict=True)]
+        if not all(1.0 / MOST_DISCS <= ratio <= MOST_DISCS for ratio in ratios):
+            words = f"{name.partition('_')[0]} {given[0]:g} and {given[1]:g} {units}"
+            yield f"{words} ({ratios[0]:.2g} and {ratios[1]:.2g} times those of solid discs)"
 
 
 def _largest_factor(name: str, value: Floats) -> float:

@@ -25,6 +25,7 @@ class TrainModel(MachineModel):
             Quantity.ANGULAR_ACCELERATION: "mrad/ms^2",
             Quantity.FORCE: "N",
             Quantity.GROWTH_RATE: "ms^-1",
+            Quantity.TIME: "ms",
         }
     )
     angle = "_angle"

@@ -17,13 +17,20 @@ from gearchaos.arguments import one_of, path_text
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
-from gearchaos.outputs.names import SECTION, SECTION_POINT, coordinate_text, diagram_axis
+from gearchaos.outputs.names import (
+    MESH_PERIOD,
+    SECTION,
+    SECTION_POINT,
+    TIME,
+    coordinate_text,
+    diagram_axis,
+)
 from gearchaos.outputs.variable import Variable
 from gearchaos.results.files.atomic_file import checksum_fits
 from gearchaos.results.files.result_file import own_metadata, write_result
 from gearchaos.results.files.result_reader import fixed_coordinates, read_result
 from gearchaos.results.reading import tables
-from gearchaos.results.reading.physical_units import in_physical_units
+from gearchaos.results.reading.physical_units import in_physical_units, in_seconds
 from gearchaos.results.reading.selection import (
     Matching,
     number_on,
@@ -292,9 +299,10 @@ class Result:
         )
 
     def physical(self, *names: str) -> Result:
-        """Convert variables to physical units: um, m/s, m/s^2, N, 1/s and Hz.
+        """Convert variables to physical units: um, m/s, m/s^2, N, s, 1/s and Hz.
 
-        Pure numbers and `parameters` stay as they are.
+        Pure numbers and `parameters` stay as they are. The time of a response is in seconds if all
+        lanes have the same mesh period, else in mesh periods.
 
         Parameters
         ----------
@@ -325,6 +333,8 @@ class Result:
             name: in_physical_units(self.variables[name], self[name], self.parameters)
             for name in wanted
         }
+        if TIME in changed and MESH_PERIOD in changed:
+            changed[TIME] = in_seconds(changed[TIME], changed[MESH_PERIOD])
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
         facts = self.parameters, self.metadata, self.fixed_axes

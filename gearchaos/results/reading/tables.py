@@ -1,13 +1,18 @@
 """Results for other libraries: an xarray Dataset, a pandas DataFrame."""
 
+import csv
+import re
 import warnings
+from collections.abc import Iterable, Sequence
 from importlib import import_module
+from io import StringIO
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.outputs.variable import Variable
 from gearchaos.results.files.result_file import DIMS
 
 if TYPE_CHECKING:
@@ -102,3 +107,25 @@ def to_dataframe(result: "Result", *along: str) -> Any:
     frame = pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
     frame.attrs["units"] = {name: result.variables[name].units for name in (*dims, *columns)}
     return frame
+
+
+def unit_text(variable: Variable) -> str:
+    """Return the unit of a variable as plain text, such as ``N`` or ``k_m b'``; ``1`` for none."""
+    if variable.units not in ("", "1"):
+        return variable.units
+    scale = variable.scale.stands_for.removeprefix("unit ").replace("$", "")
+    text = re.sub(r"\^?\{?\\prime\}?", "'", scale)
+    return re.sub(r"(k_m|')(?=[a-z\\])", r"\1 ", text).replace("\\", "") or "1"
+
+
+def csv_text(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return a table as CSV; numbers that are not finite are empty cells."""
+    written = StringIO()
+    writer = csv.writer(written, lineterminator="\n")
+    writer.writerow(headings)
+    for row in rows:
+        cells = (one.item() if isinstance(one, np.generic) else one for one in row)
+        writer.writerow(
+            ["" if isinstance(one, float) and not np.isfinite(one) else one for one in cells]
+        )
+    return written.getvalue().rstrip("\n")

@@ -1,0 +1,107 @@
+"""Every entry of every menu of the page, for each kind of result, in a real browser."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gearchaos
+from gearchaos.explorer.charts import plain_text
+from gearchaos.figures.labels import axis_label
+from gearchaos.figures.lanes import swept_axes
+from gearchaos.figures.style import VERMILION
+
+from .commands import small_config
+from .test_explore import CHROMIUM, OPTIONS, missing
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(bool(missing), reason=f"without {', '.join(missing)}"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here"),
+]
+SWEEPS = Path(__file__).resolve().parents[2] / "sweeps"
+SHORT = ("integration.transient_periods=5", "integration.recorded_periods=10")
+SHORT += ("outputs.section_points=5",)
+WITHOUT_PHASE = "pitch_error.phase_deg=0.0"
+LOAD = "second_sweep={parameter='load', values=[0.1, 0.2]}"
+KINDS = {
+    "diagram": ("gears", (WITHOUT_PHASE, "sweep.count=4")),
+    "carried": ("gears", (WITHOUT_PHASE, "sweep.count=4", "start.carry='both'")),
+    "map": ("gears", (WITHOUT_PHASE, "sweep.count=3", LOAD)),
+    "grades": (
+        "grades",
+        (*SHORT, "sweep.count=2", "pitch_error.realisations=2", "integration.steps_per_period=40"),
+    ),
+    "train": ("two_stage", (*SHORT, "sweep.count=3")),
+}
+AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machine.
+MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
+    [...menu.options].map(one => [one.value, one.textContent])])"""
+"""Title of every menu, and value and text of its entries."""
+LABEL = """() => [...Bokeh.documents[0]._all_models.values()]
+    .filter(one => one.type == "Figure")[0].left[0].axis_label"""
+"""Label at the vertical axis of the first chart."""
+FAULT = f"b[style*='{VERMILION}']"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        yield driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split())
+
+
+def saved(kind: str, folder: Path) -> Path:
+    """Compute and save a result of a kind."""
+    name, changes = KINDS[kind]
+    file = small_config(folder) if name == "gears" else SWEEPS / f"{name}.toml"
+    result = gearchaos.run(gearchaos.load_config(file, changes))
+    result.save(folder / f"{kind}.h5")
+    return folder / f"{kind}.h5"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
+    path = saved(kind, tmp_path)
+    command = [sys.executable, "-m", "gearchaos.explore", path.name, "--no-browser", "--port", "0"]
+    with (
+        (tmp_path / "said").open("w+") as said,
+        subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=said, text=True
+        ) as server,
+    ):
+        try:
+            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page.set_default_timeout(AT_MOST)
+            page.goto(server.stdout.readline().strip())
+            page.locator(".bk-Figure >> nth=5").wait_for() if kind != "map" else None
+            page.locator("pre:has-text('response')").wait_for()
+            seen = entries_drawn(page, gearchaos.open_result(path))
+            page.close()
+        finally:
+            server.terminate()
+    assert "Traceback" not in (tmp_path / "said").read_text()
+    assert {"section_delta_5", "lyapunov_exponent"} & {*seen}
+
+
+def entries_drawn(page, result: gearchaos.Result) -> list[str]:
+    """Choose every entry of every menu, see that it is drawn, and return the variables."""
+    drawn: list[str] = []
+    menus = page.locator("select")
+    for place, (title, entries) in enumerate(menus.evaluate_all(MENUS)):
+        for value, text in entries:
+            menus.nth(place).select_option(value)
+            words = {"Variable": f"--variable {text}", "Motion from": f"--begin {text}"}
+            words["Units"] = "--units physical" if text == "physical" else "plot"
+            page.locator(f"pre:has-text('{words.get(title, text)}')").wait_for()
+            assert page.locator(FAULT).all_inner_texts() == [], (title, text)
+            if title == "Variable":
+                drawn.append(text)
+                shown = text if len(swept_axes(result)) == 1 else result.axes[0]
+                label = " ".join(plain_text(axis_label(result, shown)).split())
+                page.wait_for_function(
+                    f"label => ({LABEL})().split(/\\s+/).join(' ') == label", arg=label
+                )
+    return drawn
