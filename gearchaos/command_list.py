@@ -7,6 +7,7 @@ COMMANDS = {
     "stages": "list the stages of a sweep and refine their boundaries",
     "basins": "find the attractors of a sweep from many starts, and their basins",
     "branches": "follow periodic orbits as whole branches, stable and unstable",
+    "boundaries": "follow folds, period doublings and grazing over two parameters",
     "response": "compute the motion at every step of some mesh periods",
     "reproduce": "compute, draw and compare all results of a paper",
     "info": "show the contents of a result file and verify it",
@@ -20,5 +21,5 @@ COMMANDS = {
 }
 """The command NAME is the object ``main`` of the module ``gearchaos.NAME``.
 
-Listed here, because importing 16 modules would slow down every start.
+Listed here, because importing 17 modules would slow down every start.
 """

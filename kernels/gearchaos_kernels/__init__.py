@@ -8,6 +8,7 @@ states. Everything is in the units of the equations; time is the dimensionless t
 from gearchaos_kernels.batch import integrate, maps_are_kept, maps_memory
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import Motion, evaluate, jacobian
+from gearchaos_kernels.gaps import Gaps, gap_polynomials, gaps_along, steps_taken
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.gear_pair.evaluation import mesh_motion
