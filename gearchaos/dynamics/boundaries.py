@@ -12,6 +12,7 @@ from gearchaos.arrays import Complex, Floats, Mask
 from gearchaos.dynamics.arclength import CurvePoint
 from gearchaos.dynamics.boundary_equations import PARAMETERS, Equations, OnBoundary, Reference
 from gearchaos.records.boundary import (
+    CORNER,
     CUSP,
     FLIP_NEIMARK_SACKER,
     FOLD_FLIP,
@@ -38,7 +39,7 @@ from gearchaos.records.branch import (
     TOO_MANY,
 )
 
-FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-8
+FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-5
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
 SMOOTH, TURN = 0.9, 0.3
@@ -59,6 +60,9 @@ SAME_CURVE = 2e-3
 NEAR, SAME_PLACE = 0.05, 1e-6
 """Distance from a boundary up to which a point is compared, and that of the same point."""
 
+GRAZES = 1e-3
+"""Distance of a gap from a flank, in half clearances, at which a boundary ends at a grazing."""
+
 HALF_RETURN = 1e-2
 """Half-period return distance below which a boundary ends in orbits of half the period."""
 
@@ -69,6 +73,9 @@ TESTS = {
     GRAZING: (GRAZING_FOLD, GRAZING_FLIP, GRAZING_NEIMARK_SACKER),
 }
 """Kinds of points of codimension 2 that are looked for on each kind of boundary."""
+
+FLAT = 1e-3
+"""Largest distance of a boundary from the line between two points, in shares of both ranges."""
 
 STEEP = 0.2
 """Least component of a tangent by a parameter that stays fixed while a point is corrected."""
@@ -205,7 +212,7 @@ def trace_boundary(equations: Equations, start: OnBoundary) -> TracedBoundary:
         behind, first = _half(equations, _turned(start))
     points = [_turned(one) for one in behind[:0:-1]] + ahead
     joined, located = points[:1], []
-    for one, other in pairwise(points):
+    for one, other in pairwise(_flattened(equations, points)):
         for kind, point in _located_between(equations, one, other):
             located.append(Located(kind, len(joined), point))
             joined.append(point)
@@ -216,6 +223,26 @@ def trace_boundary(equations: Equations, start: OnBoundary) -> TracedBoundary:
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     positions = np.concatenate([[0.0], np.cumsum(lengths)])
     return TracedBoundary(equations, joined, places, positions, located, (ends[0], ends[1]))
+
+
+def _flattened(equations: Equations, points: list[OnBoundary]) -> list[OnBoundary]:
+    """Add points where lines between successive ones would lie beside the curve."""
+    waiting, found = points[:0:-1], points[:1]
+    while waiting:
+        one, other = found[-1], waiting[-1]
+        chord = other.place - one.place
+        length = float(np.linalg.norm(chord))
+        middle = _cubic(one, other, np.array([0.5]))[0]
+        aside = np.linalg.norm((middle - (one.place + other.place) / 2.0)[-PARAMETERS:])
+        if aside > FLAT and length > FIRST_STEP:
+            direction = _fixed(equations, chord / length)
+            between = equations.corrected(middle, direction, one.reference)
+            if between is not None and np.linalg.norm(between.place - middle) < length / 2.0:
+                onward = np.sign(between.tangent @ chord) or 1.0
+                waiting.append(between._replace(tangent=onward * between.tangent))
+                continue
+        found.append(waiting.pop())
+    return found
 
 
 def _turned(point: OnBoundary) -> OnBoundary:
@@ -257,7 +284,7 @@ def _half(equations: Equations, start: OnBoundary) -> tuple[list[OnBoundary], st
         if trial is None or trial.tangent @ here.tangent < SMOOTH:
             step /= 2.0
             if step < SHORTEST:
-                return points, _why_lost(here)
+                return points, _why_lost(equations, here)
             continue
         if here.halfway.size and here.halfway @ trial.halfway <= 0.0:
             if np.max(np.abs(here.halfway)) < HALF_RETURN:
@@ -279,11 +306,14 @@ def _half(equations: Equations, start: OnBoundary) -> tuple[list[OnBoundary], st
     return points, TOO_MANY
 
 
-def _why_lost(here: OnBoundary) -> str:
+def _why_lost(equations: Equations, here: OnBoundary) -> str:
     """Return why no further point is found."""
     if here.halfway.size and np.max(np.abs(here.halfway)) < HALF_RETURN:
         return HALVING
-    return NO_EXTREME if here.reference.phase else LOST
+    if equations.kind == GRAZING:
+        return NO_EXTREME
+    # The test function has no derivative where a further flank grazes.
+    return CORNER if equations.nearest_flank(here.place) < GRAZES else LOST
 
 
 def _ends_in_resonance(points: list[OnBoundary]) -> bool:

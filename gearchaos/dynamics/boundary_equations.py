@@ -188,6 +188,23 @@ class Equations(NamedTuple):
                 return None
         return None
 
+    def nearest_flank(self, place: Floats) -> float:
+        """Return the least distance of an extreme of a gap from a flank, in half clearances.
+
+        ``place``: shape (states + 2,). Infinite if no gap has an extreme.
+        """
+        plan = self.plan._replace(history_periods=self.plan.recorded_periods)
+        passed = self._replace(plan=plan)._passed(place[np.newaxis], np.zeros(1, dtype=bool))
+        gaps = gaps_along(passed.system, passed.outcome.history, plan.steps_per_period)
+        found = np.inf
+        for element, half in enumerate(gaps.half_clearance[0]):
+            for flank in (2 * element, 2 * element + 1):
+                equations = self._replace(kind=GRAZING, flank=flank, plan=plan)
+                beyond, _ = _nearest_extreme(equations, passed, None)
+                away = float(np.nan_to_num(np.abs(beyond[0]), nan=np.inf))
+                found = min(found, away / (half or 1.0))
+        return found
+
     def _differentiated(self, place: Floats, reference: Reference) -> tuple[_Passed, float, Floats]:
         """Return the orbit of a place, its test function, and all derivatives.
 

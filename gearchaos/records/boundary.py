@@ -43,6 +43,7 @@ POINT_KINDS = (
 )
 """Kinds of points of codimension 2."""
 
+CORNER = "meets a grazing, where it has a corner"
 NO_EXTREME = "the gap has no extreme near the flank any more"
 NOT_STARTED = "the special point of a branch is no point of a boundary"
 BOUNDARY_ENDS = (
@@ -52,6 +53,7 @@ BOUNDARY_ENDS = (
     HALVING,
     TOO_MANY,
     LOST,
+    CORNER,
     NO_EXTREME,
     NOT_STARTED,
 )
