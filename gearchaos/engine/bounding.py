@@ -219,7 +219,7 @@ class _BoundarySearch:
 
     @cached_property
     def steps(self) -> tuple[int, int]:
-        """The usual number of steps per period that the method takes in the map, and the largest."""
+        """The usual number of steps per period that the method takes, and the largest."""
         places = [np.array([[a, b]]) for a in (0.0, 0.3, 0.6, 1.0) for b in (0.0, 1.0)]
         taken = [steps_taken(self.over.system_at(one), self.run.plan) for one in places]
         return sorted(taken)[len(taken) // 2], max(taken)

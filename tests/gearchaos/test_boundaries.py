@@ -6,16 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gearchaos_kernels import Plan
 
 import gearchaos
 from gearchaos.dynamics.boundary_equations import Equations
+from gearchaos.dynamics.branches import trace
+from gearchaos.engine.branching import BranchRange
 from gearchaos.engine.running import one_thread
 from gearchaos.models.registry import system_of
 from gearchaos.records.boundary import BOUNDARY_ENDS, CUSP
 from gearchaos.records.branch import FOLD, GRAZING, PERIOD_DOUBLING
 from gearchaos.results.files.boundary_file import write_boundaries
 from gearchaos.results.files.boundary_reader import read_boundaries
-from gearchaos_kernels import Plan
 
 from .commands import run_module
 
@@ -69,6 +71,7 @@ count = 7
 """The spur pair of Kahraman and Singh; the half clearance is its unit of length."""
 
 LOW, HIGH = np.array([0.55, 0.005]), np.array([2.0, 0.11])
+SCALE = np.array([1.5, 1.0])
 
 
 def run(command, *arguments, cwd):
@@ -107,39 +110,56 @@ def system_at(shares):
     return system_of(config(), dict(zip(names, values, strict=True)), config().needed_effects)
 
 
-def crossings(found, kind, amplitude, method="flow_map", steps=24):
-    """Return the frequencies at which curves of a kind meet a line of one amplitude, in order.
+def crossings(found, kind, number, value, method="flow_map", steps=24):
+    """Return where curves of a kind meet a line on which parameter ``number`` has a value.
 
-    A curve is followed from its nearest stored point to the line.
+    These are the values of the other parameter, in order. A curve is followed from its stored
+    points beside the line to the line.
     """
     plan = Plan(steps, 0, 1, 1, tangent=True, method=method)
-    scale, direction = np.array([1.5, 1.0]), np.array([0.0, 0.0, 0.0, 1.0])
-    equations = Equations(system_at, plan, 1, scale, kind)
+    direction = np.zeros(4)
+    direction[2 + number] = 1.0
+    equations = Equations(system_at, plan, 1, SCALE, kind)
     if kind == GRAZING:
         equations = equations.grazing(0, steps)
     places = []
     for one in found.boundaries:
         if one.kind != kind:
             continue
-        side = one.values[:, 1] - amplitude
+        side = one.values[:, number] - value
         for at in np.flatnonzero(side[:-1] * side[1:] < 0.0):
             part = side[at] / (side[at] - side[at + 1])
             between = one.values[at] + part * np.diff(one.values[at : at + 2], axis=0)[0]
             state = one.section[at, -1] + part * np.diff(one.section[at : at + 2, -1], axis=0)[0]
-            guess = np.concatenate([state / scale, (between - LOW) / (HIGH - LOW)])
+            guess = np.concatenate([state / SCALE, (between - LOW) / (HIGH - LOW)])
             with one_thread():
                 point = equations.begun(guess, direction)
             assert point is not None
-            places.append(float(LOW[0] + point.shares[0] * (HIGH[0] - LOW[0])))
+            places.append(float((LOW + point.shares * (HIGH - LOW))[1 - number]))
     return sorted(places)
 
 
-@cache
-def branch_at(amplitude):
-    """Return the branch of the impacting orbit over the frequency at one amplitude."""
-    fixed = config().at({"force.error.amplitude": amplitude})
-    system = gearchaos.System(fixed, frequency=1.99)
-    return system.branch(system.orbit(), "frequency", LOW[0], HIGH[0])
+def specials_on(number, value, method="flow_map", steps=24):
+    """Return the special points of the branch on the same line, by kind."""
+    other = 1 - number
+
+    def systems(at):
+        shares = np.zeros((at.size, 2))
+        shares[:, number] = (value - LOW[number]) / (HIGH - LOW)[number]
+        shares[:, other] = (at - LOW[other]) / (HIGH - LOW)[other]
+        return system_at(shares)
+
+    over = BranchRange(systems, LOW[other], HIGH[other])
+    curve = over.curve(Plan(steps, 0, 1, 1, method=method), 1, SCALE)
+    # Where the error is small, or far above the resonance, the motion is near rest on the flank.
+    guess = np.array([1.1, 0.0, 0.001]) if number == 0 else np.array([1.1 - 1.4 * value, 0.0, 0.99])
+    with one_thread():
+        start = curve.corrected(guess / np.append(SCALE, 1.0), np.array([0.0, 0.0, 1.0]))
+        branch = trace(curve, start)
+    found = {kind: [] for kind in (FOLD, PERIOD_DOUBLING, GRAZING)}
+    for one in branch.specials:
+        found[one.kind].append(float(over.value(one.point.share)))
+    return found
 
 
 def test_curves_meet_exact_special_points(found):
@@ -149,17 +169,19 @@ def test_curves_meet_exact_special_points(found):
             (PERIOD_DOUBLING, "period_doubling"),
             (GRAZING, "grazing"),
         ):
-            met = crossings(found, kind, exact["F_ah"])
+            met = crossings(found, kind, 1, exact["F_ah"])
             for value in exact[key]:
                 assert min(abs(one - value) for one in met) < 1e-8, (kind, value, met)
 
 
-@pytest.mark.parametrize("amplitude", np.linspace(0.0131, 0.1057, 20).tolist())
-def test_curves_meet_the_special_points_of_branches_on_twenty_lines(found, amplitude):
-    specials = branch_at(amplitude).specials
-    for kind in (FOLD, PERIOD_DOUBLING, GRAZING):
-        expected = sorted(one.value for one in specials if one.kind == kind)
-        assert crossings(found, kind, amplitude) == pytest.approx(expected, abs=1e-8)
+LINES = [(0, value) for value in np.linspace(0.75, 1.97, 17).tolist()]
+LINES += [(1, value) for value in (0.015, 0.047, 0.0913)]
+
+
+@pytest.mark.parametrize(("number", "value"), LINES)
+def test_curves_meet_the_special_points_of_branches_on_twenty_lines(found, number, value):
+    for kind, expected in specials_on(number, value).items():
+        assert crossings(found, kind, number, value) == pytest.approx(sorted(expected), abs=1e-8)
 
 
 def test_the_motion_that_never_separates_grazes_where_the_linear_response_reaches_the_flank(found):
@@ -175,24 +197,21 @@ def test_the_motion_that_never_separates_grazes_where_the_linear_response_reache
 
 def test_two_folds_vanish_in_a_cusp(found):
     (cusp,) = [point for one in found.boundaries for point in one.points if point.kind == CUSP]
-    amplitude = cusp.values[1]
-    assert crossings(found, FOLD, amplitude - 1e-7) == []
-    below, above = crossings(found, FOLD, amplitude + 1e-7)
-    assert below < cusp.values[0] < above
-    # The width of the horn grows with the power 3/2.
-    wider = np.subtract(*crossings(found, FOLD, amplitude + 4e-7)[::-1])
-    assert wider / (above - below) == pytest.approx(8.0, rel=0.02)
+    assert crossings(found, FOLD, 1, cusp.values[1] - 1e-5) == []
+    widths = [
+        float(np.diff(crossings(found, FOLD, 1, cusp.values[1] + beyond))[0])
+        for beyond in (1e-3, 2e-3)
+    ]
+    # The width of the horn grows with the power 3/2 of the distance.
+    assert widths[1] / widths[0] == pytest.approx(2.0**1.5, rel=0.1)
 
 
 def test_rk4_is_followed_as_its_step_map(found):
-    rough = config().replace("integration", {"method": "rk4", "steps_per_period": 100})
-    system = gearchaos.System(rough.at({"force.error.amplitude": 0.05}), frequency=1.99)
-    branch = system.branch(system.orbit(), "frequency", LOW[0], HIGH[0])
+    expected = specials_on(0, 0.75, "rk4", 100)
     for kind in (FOLD, GRAZING):
-        expected = sorted(one.value for one in branch.specials if one.kind == kind)
-        met = crossings(found, kind, 0.05, "rk4", 100)
-        assert met == pytest.approx(expected, abs=1e-8)
-        assert met != pytest.approx(crossings(found, kind, 0.05), abs=1e-8)
+        met = crossings(found, kind, 0, 0.75, "rk4", 100)
+        assert met == pytest.approx(sorted(expected[kind]), abs=1e-8)
+        assert met != pytest.approx(crossings(found, kind, 0, 0.75), abs=1e-8)
 
 
 def test_the_table_lists_every_curve_with_its_ends_and_points(files, found):
@@ -263,7 +282,6 @@ def test_each_kind_has_a_line_of_its_own(found):
         assert line.get_color() == LINES[kind]["color"]
     with pytest.raises(gearchaos.GearchaosError, match="give the boundaries of this map"):
         draw_boundaries(axes, found, ["frequency", "pitch_error"])
-
 
 
 @pytest.mark.parametrize(
