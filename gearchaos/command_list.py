@@ -8,6 +8,7 @@ COMMANDS = {
     "basins": "find the attractors of a sweep from many starts, and their basins",
     "shares": "print the shares of motions among drawn gear pairs or starts",
     "branches": "follow periodic orbits as whole branches, stable and unstable",
+    "boundaries": "follow folds, period doublings and grazing over two parameters",
     "control": "keep a gear pair on a periodic orbit by its load",
     "response": "compute the motion at every step of some mesh periods",
     "reproduce": "compute, draw and compare all results of a paper",
@@ -22,5 +23,5 @@ COMMANDS = {
 }
 """The command NAME is the object ``main`` of the module ``gearchaos.NAME``.
 
-Listed here, because importing 18 modules would slow down every start.
+Listed here, because importing 19 modules would slow down every start.
 """

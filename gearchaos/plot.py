@@ -3,7 +3,8 @@
 A sweep of one parameter becomes its bifurcation diagram above its Lyapunov chart. A sweep of two
 parameters becomes maps of motion, exponent and contact. A response becomes one page for each lane,
 with time history, phase portrait, Poincare section and amplitude spectrum. A file of branches
-becomes a page of its orbits above their Floquet multipliers.
+becomes a page of its orbits above their Floquet multipliers, a file of boundaries a page of curves
+over both parameters.
 
 --variable names what is drawn. For a sweep it is a section variable (default: section_delta_5), any
 variable with one number per lane, or an amplitude such as amplitude_transmission_error. For a map
@@ -123,6 +124,14 @@ class PlotOptions(NamedTuple):
             file=True,
         ),
     ] = None
+    boundaries: Annotated[
+        Path | None,
+        Option(
+            "draw the curves of this file of gearchaos boundaries over the map",
+            "BOUNDARIES.h5",
+            file=True,
+        ),
+    ] = None
     width: Annotated[
         float | None,
         Option(
@@ -154,9 +163,13 @@ class PlotOptions(NamedTuple):
 
 def _plot(options: PlotOptions) -> None:
     from gearchaos.figures.response import is_response
+    from gearchaos.results.files.boundary_reader import is_boundary_file
     from gearchaos.results.files.branch_reader import is_branch_file
     from gearchaos.results.reading.physical_units import in_units
 
+    if any(map(is_boundary_file, options.results)):
+        _plot_boundaries(options)
+        return
     if any(map(is_branch_file, options.results)):
         _plot_branches(options)
         return
@@ -170,6 +183,7 @@ def _plot(options: PlotOptions) -> None:
             "--shares": options.shares,
             "--mark": options.mark,
             "--branches": options.branches,
+            "--boundaries": options.boundaries,
         }
         _draws_alone("a response", options, flags)
     make = _response_sheets if responses[0] else _sweep_sheets
@@ -189,7 +203,7 @@ def _write(
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.style import with_font
 
-    sources = [*options.results, *([options.branches] if options.branches else [])]
+    sources = [*options.results, *filter(None, (options.branches, options.boundaries))]
     check_figures([path for paths in targets for path in paths], sources, options.overwrite)
     with progress(len(sheets), unit="pages") as bar, with_font(options.font):
         for (_, draw), paths in zip(sheets, targets, strict=True):
@@ -226,6 +240,7 @@ def _plot_branches(options: PlotOptions) -> None:
         "--mark": options.mark,
         "--at": options.at,
         "--branches": options.branches,
+        "--boundaries": options.boundaries,
         "--units": options.units == "physical",
     }
     _draws_alone("a file of branches", options, flags)
@@ -241,6 +256,63 @@ def _plot_branches(options: PlotOptions) -> None:
     drawn = _write(sheets, targets, options)
     orbits = sum(one.value.size for one in found.branches)
     say(f"{len(found.branches)} branches, {orbits} orbits over {found.parameter.name}, {drawn}")
+
+
+def _plot_boundaries(options: PlotOptions) -> None:
+    """Draw the page of a file of boundaries."""
+    from gearchaos.figures.boundaries import boundaries_page
+    from gearchaos.figures.style import SINGLE_COLUMN_MM
+    from gearchaos.results.files.boundary_reader import read_boundaries
+
+    flags: dict[str, object] = {
+        "--variable": options.variable,
+        "--stages": options.stages,
+        "--shares": options.shares,
+        "--mark": options.mark,
+        "--at": options.at,
+        "--branches": options.branches,
+        "--boundaries": options.boundaries,
+        "--units": options.units == "physical",
+    }
+    _draws_alone("a file of boundaries", options, flags)
+    found = read_boundaries(options.results[0])
+    width, between = options.width or SINGLE_COLUMN_MM, (options.low, options.high)
+    size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": options.height}
+    draw = partial(boundaries_page, found, **size)
+    drawn = _write([("", draw)], [_targets(options, "", alone=True)], options)
+    names = " and ".join(one.name for one in found.parameters)
+    say(f"{len(found.boundaries)} boundaries over {names}, {drawn}")
+
+
+def _with_boundaries(
+    result: "Result", options: PlotOptions, draw: "Callable[[], Page]"
+) -> "Callable[[], Page]":
+    """Return the function that draws a map with the curves of --boundaries."""
+    if options.boundaries is None:
+        return draw
+    from gearchaos.figures.boundaries import add_boundaries
+    from gearchaos.figures.lanes import map_axes
+    from gearchaos.results.files.boundary_reader import read_boundaries
+
+    found, axes = read_boundaries(options.boundaries), map_axes(result)
+    if {one.name for one in found.parameters} != {*axes}:
+        raise FigureError(
+            f"--boundaries {options.boundaries}: holds curves over "
+            f"{' and '.join(one.name for one in found.parameters)}, and the map is over "
+            f"{' and '.join(axes)}; give the boundaries of this map"
+        )
+    if options.units == "physical":
+        raise FigureError(
+            "--boundaries: the curves are over the swept parameters as configured; leave --units "
+            "physical out, or the boundaries"
+        )
+
+    def drawn() -> "Page":
+        figure = draw()
+        add_boundaries(figure, found, axes)
+        return figure
+
+    return drawn
 
 
 def _with_branches(
@@ -319,6 +391,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
             "--variable": options.variable,
             "--stages": options.stages,
             "--branches": options.branches,
+            "--boundaries": options.boundaries,
         }
         _draws_alone("a figure of shares", options, flags)
         return [(f"{name}_shares", partial(shares_page, results[0], between, width, height))]
@@ -328,7 +401,13 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
         page = f"a map; --at {maps[0][0]}=VALUE makes a diagram of it"
         _draws_alone(page, options, {"--stages": options.stages, "--branches": options.branches})
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
-        return [(name, draw)]
+        name += "_with_boundaries" if options.boundaries else ""
+        return [(name, _with_boundaries(results[0], options, draw))]
+    if options.boundaries:
+        raise FigureError(
+            f"--boundaries {options.boundaries}: are drawn over maps of two parameters, and here "
+            "is a diagram of one; leave it out"
+        )
     name += "_stages" if options.stages else ""
     shown: dict[str, Any] = {"stages": options.stages, "labels": _labels(results, options)}
     if marked:

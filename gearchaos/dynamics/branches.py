@@ -173,7 +173,9 @@ def _distance(section: Floats, place: Floats) -> float:
     return float(np.min(np.max(np.abs(section - place[:-1]), axis=1)))
 
 
-def trace(curve: Curve, start: CurvePoint, one_way: bool = False) -> TracedBranch:
+def trace(
+    curve: Curve, start: CurvePoint, one_way: bool = False, located: float = LOCATED
+) -> TracedBranch:
     """Follow a branch from one of its points in both directions.
 
     Parameters
@@ -184,6 +186,8 @@ def trace(curve: Curve, start: CurvePoint, one_way: bool = False) -> TracedBranc
         A point of the curve within the range.
     one_way : bool
         Whether the branch begins at this point, and is followed along its tangent only.
+    located : float
+        Length of the stretch of the branch in which a special point lies.
 
     Returns
     -------
@@ -196,16 +200,18 @@ def trace(curve: Curve, start: CurvePoint, one_way: bool = False) -> TracedBranc
         behind, first = _half(curve, start._replace(tangent=-start.tangent))
     points = [one._replace(tangent=-one.tangent) for one in behind[:0:-1]] + ahead
     ends = (last, last) if last == CLOSED_CURVE else (first, last)
-    return _with_specials(curve, points, ends)
+    return _with_specials(curve, points, ends, located)
 
 
-def _with_specials(curve: Curve, points: list[CurvePoint], ends: tuple[str, str]) -> TracedBranch:
+def _with_specials(
+    curve: Curve, points: list[CurvePoint], ends: tuple[str, str], located: float
+) -> TracedBranch:
     """Return the branch through points, with its special points located and among its points."""
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
     for one, other in pairwise(points):
         chord = other.place - one.place
-        between = _specials_between(curve, one, other)
+        between = _specials_between(curve, one, other, located)
         between.sort(key=lambda special: float((special[1].place - one.place) @ chord))
         for special in between:
             found.append((len(joined), special))
@@ -335,7 +341,7 @@ def _test_functions(point: CurvePoint) -> dict[str, float]:
 
 
 def _specials_between(
-    curve: Curve, one: CurvePoint, other: CurvePoint
+    curve: Curve, one: CurvePoint, other: CurvePoint, located: float
 ) -> list[tuple[str, CurvePoint, int]]:
     """Return kind, point and flank of the special points between two points of a curve."""
     before, after = _test_functions(one), _test_functions(other)
@@ -350,10 +356,10 @@ def _specials_between(
         def test_function(at: CurvePoint, kind: str = kind) -> float:
             return _test_functions(at)[kind]
 
-        point = _located(curve, one, other, test_function)
+        point = _located(curve, one, other, test_function, located)
         if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers)):
             found.append((kind, point, -1))
-    found += [(GRAZING, *graze) for graze in _grazings(curve, one, other)]
+    found += [(GRAZING, *graze) for graze in _grazings(curve, one, other, located)]
     return found
 
 
@@ -364,7 +370,9 @@ def _has_pair_on_circle(multipliers: Complex) -> bool:
     return bool(nearest[0].imag != 0.0)
 
 
-def _grazings(curve: Curve, one: CurvePoint, other: CurvePoint) -> list[tuple[CurvePoint, int]]:
+def _grazings(
+    curve: Curve, one: CurvePoint, other: CurvePoint, located: float
+) -> list[tuple[CurvePoint, int]]:
     """Return the points between two points at which impacts appear or vanish, with their flanks."""
     found: list[tuple[CurvePoint, int]] = []
     for flank, (before, after) in enumerate(zip(one.impacts, other.impacts, strict=True)):
@@ -374,14 +382,18 @@ def _grazings(curve: Curve, one: CurvePoint, other: CurvePoint) -> list[tuple[Cu
         def changed(at: CurvePoint, flank: int = flank, before: int = before) -> float:
             return 1.0 if at.impacts[flank] == before else -1.0
 
-        point = _located(curve, one, other, changed)
+        point = _located(curve, one, other, changed, located)
         if point is not None:
             found.append((point, flank))
     return found
 
 
 def _located(
-    curve: Curve, one: CurvePoint, other: CurvePoint, function: Callable[[CurvePoint], float]
+    curve: Curve,
+    one: CurvePoint,
+    other: CurvePoint,
+    function: Callable[[CurvePoint], float],
+    located: float,
 ) -> CurvePoint | None:
     """Return the point between two points of a curve at which a function changes its sign.
 
@@ -393,7 +405,7 @@ def _located(
     for number in range(MOST_TRIALS):
         chord = other.place - one.place
         length = float(np.linalg.norm(chord))
-        if length <= LOCATED:
+        if length <= located:
             break
         share = 0.5 if number % 3 == 2 or abs(low) == abs(high) else low / (low - high)
         share = min(max(share, 1e-3), 1.0 - 1e-3)

@@ -10,7 +10,7 @@ from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
-from gearchaos.dynamics.branches import TracedBranch, doubled_start, trace
+from gearchaos.dynamics.branches import LOCATED, TracedBranch, doubled_start, trace
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
@@ -92,7 +92,7 @@ def find_branches(
         return system_of(config, {parameter: at}, config.needed_effects)
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
-    search = _Search(over, plan_run(config), longest)
+    search = BranchSearch(over, plan_run(config), longest)
     with one_thread():
         for motion in search.motions(result, swept[0]):
             check()
@@ -135,13 +135,24 @@ class BranchRange(NamedTuple):
         return Curve(self.system_at, plan, period, scale)
 
 
-class _Search:
-    """The branches that are known so far; arguments as in `find_branches`."""
+class BranchSearch:
+    """The branches that are known so far; arguments as in `find_branches`.
 
-    def __init__(self, over: BranchRange, run: RunPlan, longest: int) -> None:
-        self.over, self.run, self.longest = over, run, longest
+    ``located``: length of the stretch of a branch in which a special point is located; ``scale``
+    (states,): scales of the states, by default those of the motions.
+    """
+
+    def __init__(
+        self,
+        over: BranchRange,
+        run: RunPlan,
+        longest: int,
+        located: float = LOCATED,
+        scale: Floats | None = None,
+    ) -> None:
+        self.over, self.run, self.longest, self.located = over, run, longest, located
         self.found: list[TracedBranch] = []
-        self._scale = np.ones(len(self.run.lanes.states))
+        self._scale = scale
 
     def motions(self, result: Result, axis: str) -> Iterator[_Motion]:
         """Yield the periodic motions of the result, in the order of the parameter."""
@@ -166,7 +177,8 @@ class _Search:
         )
         sections = integrate(system, states, plan).every(system.repeats_after).section
         # One scale for all branches: that of one motion would be too small along the branch.
-        self._scale = coordinate_scale(sections.reshape(1, -1, states.shape[1]))[0]
+        if self._scale is None:
+            self._scale = coordinate_scale(sections.reshape(1, -1, states.shape[1]))[0]
         for lane, share, section in zip(lanes, shares, sections, strict=True):
             n = int(period[lane])
             yield _Motion(float(share), section[:n], n)
@@ -175,6 +187,7 @@ class _Search:
         """Follow the orbit of a motion, unless it lies on a known branch, and all its doublings."""
         if self._known(motion, NEAR):
             return
+        assert self._scale is not None, "motions() gives the scales"
         waiting = deque([motion])
         while waiting:
             motion = waiting.popleft()
@@ -183,7 +196,7 @@ class _Search:
             start = curve.corrected(guess, along_the_way(guess.size - 1))
             if start is None or self._known(_motion_at(curve, start), SAME):
                 continue
-            self._add(trace(curve, start), waiting)
+            self._add(trace(curve, start, located=self.located), waiting)
 
     def _add(self, branch: TracedBranch, waiting: "deque[_Motion]") -> None:
         """Add a branch unless it is known, and those that begin at its period doublings."""
@@ -206,7 +219,7 @@ class _Search:
             if special.kind == PERIOD_DOUBLING:
                 start, doubled = doubled_start(branch.curve, special.point), branch.curve.doubled()
                 if start is not None and not self._known(_motion_at(doubled, start), SAME):
-                    self._add(trace(doubled, start, one_way=True), waiting)
+                    self._add(trace(doubled, start, True, self.located), waiting)
 
     def _found_before(self, branch: TracedBranch) -> bool:
         """Whether most of some points in the middle of a branch lie on a branch that is known."""
@@ -227,7 +240,7 @@ def _motion_at(curve: Curve, point: CurvePoint) -> _Motion:
     return _Motion(point.share, point.section, curve.periods)
 
 
-def _described(search: _Search, parameter: Variable) -> BranchSet:
+def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
     """Return the branches of a search as arrays with their descriptions."""
     run = search.run
     catalogue = run.lanes.model.catalogue
@@ -270,7 +283,7 @@ def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> P
                 one.position,
                 one.point.section,
                 one.point.multipliers,
-                _flank(run, one.flank),
+                flank_name(run, one.flank),
             )
             for one in branch.specials
         ),
@@ -279,7 +292,7 @@ def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> P
     )
 
 
-def _flank(run: RunPlan, number: int) -> str:
+def flank_name(run: RunPlan, number: int) -> str:
     """Return the name of a flank of an element, such as "mesh, back flank"; empty for none."""
     if number < 0:
         return ""

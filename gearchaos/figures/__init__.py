@@ -1,5 +1,6 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
+from gearchaos.figures.boundaries import add_boundaries, boundaries_page, draw_boundaries
 from gearchaos.figures.branches import add_branches, branches_page, draw_branches
 from gearchaos.figures.control import control_page
 from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall

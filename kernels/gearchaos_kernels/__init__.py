@@ -9,6 +9,7 @@ from gearchaos_kernels.batch import integrate, maps_are_kept, maps_memory
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.control import Control
 from gearchaos_kernels.evaluation import Motion, evaluate, jacobian
+from gearchaos_kernels.gaps import Gaps, gap_polynomials, gaps_along, steps_taken
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.gear_pair.evaluation import mesh_motion

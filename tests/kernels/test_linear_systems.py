@@ -176,11 +176,20 @@ def test_flow_maps_are_exact_where_elements_of_every_kind_cross(size):
 def test_flow_maps_record_the_loads_of_fine_steps_where_dampers_act_in_contact(size):
     machines, start, _, _, _ = exact(*size)
     system = lanes_of(machines)
-    wanted = integrate(system, start, Plan(12800, **WITH_LOADS)).loads
+    coarse, wanted = (integrate(system, start, Plan(n, **WITH_LOADS)).loads for n in (3200, 6400))
     found = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map")).loads
     size = np.abs(wanted[..., :2]).max(axis=2)
-    assert (np.abs(found[..., :2] - wanted[..., :2]).max(axis=2) <= 1e-8 * size).all()
-    # A jump of a force within a step is the error of the fine steps.
+    error, double = (np.abs(found - one)[..., :2].max(axis=2) / size for one in (wanted, coarse))
+    # A force may be largest where it jumps. Fine steps see it at their ends only: an error that
+    # falls with the step, whereas other extremes have order 4.
+    at_jumps = error > 1e-8
+    assert (at_jumps.sum(axis=1) <= 1).all()
+    assert (error[at_jumps] <= 5e-5).all()
+    assert (error[at_jumps] < double[at_jumps]).all()
+    halved = Plan(120, **WITH_LOADS, method="flow_map")
+    extremes = integrate(system, start, halved).loads[..., :2]
+    assert (np.abs(found[..., :2] - extremes).max(axis=2) <= 1e-11 * size).all()
+    # The same error of the fine steps.
     assert (np.abs(found[..., 2] - wanted[..., 2]) <= 1e-5 * size).all()
     assert (np.abs(found[..., 3] - wanted[..., 3]) <= 1e-5 * size**2).all()
 

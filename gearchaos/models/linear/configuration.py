@@ -3,7 +3,7 @@
 import csv
 from abc import abstractmethod
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from io import StringIO
 from types import MappingProxyType
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.base import Configuration, configuration_keys
-from gearchaos.configuration.keys import key
+from gearchaos.configuration.keys import Key, key
 from gearchaos.configuration.messages import Fault, declared_path
 from gearchaos.configuration.named_files import fault_of, text_beside
 from gearchaos.configuration.ranges import Range
@@ -184,12 +184,19 @@ class LinearConfiguration(MachineConfiguration):
 
 def parameters_in(kind: type[Configuration], tables: Mapping[str, Any]) -> dict[str, Parameter]:
     """Return the numbers inside tables of a configuration as parameters, by their dotted path."""
-    keys, found = configuration_keys(kind), {}
+    found = {}
     for path, _, _ in numbers_in(tables):
-        key = keys[declared_path(path.split("."), keys)]
+        key = _declared_key(kind, path)
         words = f"{key.wording} of {path.split('.')[1]}" if path.count(".") > 1 else key.wording
         found[path] = Parameter(path, path, key.valid, key.units or "1", words)
     return found
+
+
+@cache
+def _declared_key(kind: type[Configuration], path: str) -> Key:
+    """Return the key that declares a number; kept, because continuation needs it at every step."""
+    keys = configuration_keys(kind)
+    return keys[declared_path(path.split("."), keys)]
 
 
 def _matrix(given: Any) -> Floats:

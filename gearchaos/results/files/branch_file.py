@@ -111,7 +111,7 @@ def _variables(found: BranchSet) -> list[Variable]:
     periods = max((branch.period for branch in found.branches), default=1)
     lengths = {POINT: points, SPECIAL: len(specials), BRANCH: len(found.branches)}
     counts = [
-        _whole(dim, (dim,), np.arange(size), f"number of the {dim.replace('_', ' ')}")
+        whole_numbers(dim, (dim,), np.arange(size), f"number of the {dim.replace('_', ' ')}")
         for dim, size in {**lengths, SECTION_POINT: periods}.items()
     ]
     states = Variable(
@@ -132,7 +132,7 @@ def _variables(found: BranchSet) -> list[Variable]:
     ]
 
 
-def _whole(
+def whole_numbers(
     name: str, dims: tuple[str, ...], values: Any, long_name: str, flags: tuple[str, ...] = ()
 ) -> Variable:
     """Return a variable of whole numbers."""
@@ -140,7 +140,7 @@ def _whole(
     return Variable(name, dims, "int32", "1", long_name, flags=flags, values=np.asarray(values))
 
 
-def _number(name: str, dims: tuple[str, ...], values: Any, long_name: str) -> Variable:
+def real_numbers(name: str, dims: tuple[str, ...], values: Any, long_name: str) -> Variable:
     """Return a variable of dimensionless numbers."""
     return Variable(
         name, dims, "float64", "1", long_name, fill_value=np.nan, values=np.asarray(values)
@@ -153,15 +153,17 @@ def _of_branches(found: BranchSet) -> list[Variable]:
     first, last = ends.reshape(-1, 2).T
     periods = [one.period for one in found.branches]
     return [
-        _whole("period", (BRANCH,), periods, "period in excitation periods"),
-        _whole(
+        whole_numbers("period", (BRANCH,), periods, "period in excitation periods"),
+        whole_numbers(
             "first_end", (BRANCH,), first, "why the branch ends at its first point", BRANCH_ENDS
         ),
-        _whole("last_end", (BRANCH,), last, "why the branch ends at its last point", BRANCH_ENDS),
+        whole_numbers(
+            "last_end", (BRANCH,), last, "why the branch ends at its last point", BRANCH_ENDS
+        ),
     ]
 
 
-def _joined(arrays: Iterable[Array], *sizes: int) -> Array:
+def joined(arrays: Iterable[Array], *sizes: int) -> Array:
     """Join arrays along their first axis; ``sizes`` of the others are those of an empty result."""
     return np.concatenate([np.zeros((0, *sizes)), *arrays])
 
@@ -170,24 +172,26 @@ def _of_points(found: BranchSet, periods: int) -> list[Variable]:
     """Return the variables of the points of all branches; ``periods``: the longest period."""
     branches, states = found.branches, len(found.states)
     numbers = np.repeat(np.arange(len(branches)), [one.value.size for one in branches])
-    multipliers = _joined([one.multipliers for one in branches], states)
-    sections = _joined([_padded(one.section, periods) for one in branches], periods, states)
+    multipliers = joined([one.multipliers for one in branches], states)
+    sections = joined([padded(one.section, periods) for one in branches], periods, states)
     listed = [
-        replace(found.parameter, dims=(POINT,), values=_joined(one.value for one in branches)),
-        _whole("branch_of_point", (POINT,), numbers, "number of the branch of a point"),
-        _number("arclength", (POINT,), _joined(one.arclength for one in branches), "arclength"),
-        _whole("stable", (POINT,), _joined(one.stable for one in branches), "whether it is stable"),
-        _number(
+        replace(found.parameter, dims=(POINT,), values=joined(one.value for one in branches)),
+        whole_numbers("branch_of_point", (POINT,), numbers, "number of the branch of a point"),
+        real_numbers("arclength", (POINT,), joined(one.arclength for one in branches), "arclength"),
+        whole_numbers(
+            "stable", (POINT,), joined(one.stable for one in branches), "whether it is stable"
+        ),
+        real_numbers(
             "lyapunov_exponent",
             (POINT,),
-            _joined(one.exponent for one in branches),
+            joined(one.exponent for one in branches),
             "largest Lyapunov exponent of the orbit",
         ),
-        *_complex("multiplier", (POINT, STATE), multipliers, "Floquet multiplier"),
-        *_sections(found, "", POINT, sections),
+        *complex_parts("multiplier", (POINT, STATE), multipliers, "Floquet multiplier"),
+        *sections_of(found.states, "", POINT, sections),
     ]
     for variable in found.quantities:
-        values = _joined(one.quantities[variable.name] for one in branches)
+        values = joined(one.quantities[variable.name] for one in branches)
         listed.append(
             replace(
                 variable,
@@ -208,49 +212,57 @@ def _of_specials(
     """Return the variables of the special points; ``numbers``: their branches."""
     states, flanks = len(found.states), ["", *_flanks(found)]
     kinds = [SPECIAL_KINDS.index(one.kind) for one in specials]
-    multipliers = _joined([one.multipliers[np.newaxis] for one in specials], states)
-    sections = _joined(
-        [_padded(one.section[np.newaxis], periods) for one in specials], periods, states
+    multipliers = joined([one.multipliers[np.newaxis] for one in specials], states)
+    sections = joined(
+        [padded(one.section[np.newaxis], periods) for one in specials], periods, states
     )
     values = np.array([one.value for one in specials])
     name, dims = OF_SPECIAL + found.parameter.name, (SPECIAL,)
     return [
-        _whole(f"{OF_SPECIAL}kind", dims, kinds, "kind of the special point", SPECIAL_KINDS),
+        whole_numbers(f"{OF_SPECIAL}kind", dims, kinds, "kind of the special point", SPECIAL_KINDS),
         replace(found.parameter, name=name, dims=dims, values=values),
-        _whole(f"{OF_SPECIAL}branch", dims, numbers, "number of the branch of a special point"),
-        _number(
+        whole_numbers(
+            f"{OF_SPECIAL}branch", dims, numbers, "number of the branch of a special point"
+        ),
+        real_numbers(
             f"{OF_SPECIAL}arclength",
             dims,
             [one.arclength for one in specials],
             "arclength of a special point on its branch",
         ),
-        _whole(
+        whole_numbers(
             f"{OF_SPECIAL}flank",
             dims,
             [flanks.index(one.flank) for one in specials],
             f"flank that grazes: line of the attribute {FLANKS}, 0 for none",
         ),
-        *_complex(f"{OF_SPECIAL}multiplier", (SPECIAL, STATE), multipliers, "Floquet multiplier"),
-        *_sections(found, OF_SPECIAL, SPECIAL, sections),
+        *complex_parts(
+            f"{OF_SPECIAL}multiplier", (SPECIAL, STATE), multipliers, "Floquet multiplier"
+        ),
+        *sections_of(found.states, OF_SPECIAL, SPECIAL, sections),
     ]
 
 
-def _padded(section: Floats, periods: int) -> Floats:
+def padded(section: Floats, periods: int) -> Floats:
     """Fill a section (points, period, states) with NaN up to a number of periods."""
     more = periods - section.shape[1]
     return np.pad(section, ((0, 0), (0, more), (0, 0)), constant_values=np.nan)
 
 
-def _complex(name: str, dims: tuple[str, ...], values: Array, long_name: str) -> list[Variable]:
+def complex_parts(
+    name: str, dims: tuple[str, ...], values: Array, long_name: str
+) -> list[Variable]:
     """Return the real and the imaginary part of complex numbers as two variables."""
     parts = {"real": np.real(values), "imaginary": np.imag(values)}
     return [
-        _number(f"{name}_{part}", dims, array, f"{part} part of the {long_name}")
+        real_numbers(f"{name}_{part}", dims, array, f"{part} part of the {long_name}")
         for part, array in parts.items()
     ]
 
 
-def _sections(found: BranchSet, start: str, dim: str, sections: Floats) -> list[Variable]:
+def sections_of(
+    states: tuple[Variable, ...], start: str, dim: str, sections: Floats
+) -> list[Variable]:
     """Return one variable for each state of sections (points, periods, states)."""
     return [
         replace(
@@ -260,5 +272,5 @@ def _sections(found: BranchSet, start: str, dim: str, sections: Floats) -> list[
             errors=(),
             values=sections[..., number],
         )
-        for number, variable in enumerate(found.states)
+        for number, variable in enumerate(states)
     ]

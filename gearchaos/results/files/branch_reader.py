@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
@@ -26,15 +26,22 @@ from gearchaos.results.files.branch_file import (
 )
 from gearchaos.results.files.result_reader import printable
 
+Content = TypeVar("Content")
+
 
 def is_branch_file(path: str | os.PathLike[str]) -> bool:
     """Whether a file says of itself that it holds branches."""
+    return schema_of(path) == SCHEMA
+
+
+def schema_of(path: str | os.PathLike[str]) -> str:
+    """Return what kind of file a file says it is, empty if it does not say so."""
     try:
         with h5py.File(os.fspath(path), "r") as file:
-            return str(stored.scalars_of(file).get("schema", "")) == SCHEMA
+            return str(stored.scalars_of(file).get("schema", ""))
     except Exception:
         # h5py raises nearly any kind of exception for a damaged file.
-        return False
+        return ""
 
 
 def read_branches(path: str | os.PathLike[str]) -> BranchSet:
@@ -56,42 +63,64 @@ def read_branches(path: str | os.PathLike[str]) -> BranchSet:
         If the file is missing or damaged, if it holds no branches, or if its format has another
         major version.
     """
-    name = os.fspath(path)
-    remedy = "run gearchaos branches again"
+    kind = FileKind("branches", "gearchaos branches", SCHEMA, SCHEMA_VERSION)
+    return read_kind(path, kind, _read)
+
+
+class FileKind(NamedTuple):
+    """A kind of file: what it holds, the command that writes it, its schema and version."""
+
+    content: str
+    command: str
+    schema: str
+    version: str
+
+
+def read_kind(
+    path: str | os.PathLike[str],
+    kind: FileKind,
+    read: Callable[[Mapping[str, h5py.Dataset], dict[str, Any]], Content],
+) -> Content:
+    """Read a file of a kind; any other file raises a FileError of one sentence.
+
+    ``read``: returns the content of an open file from its datasets and metadata.
+    """
+    name, remedy = os.fspath(path), f"run {kind.command} again"
     try:
         if checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); {remedy}")
         with h5py.File(name, "r") as file:
             metadata = stored.scalars_of(file)
-            _check_schema(name, metadata)
-            return _read(stored.datasets_of(file), metadata)
+            _check_schema(name, metadata, kind)
+            return read(stored.datasets_of(file), metadata)
     except FileError:
         raise
     except stored.UnfitError as error:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except FileNotFoundError as error:
         raise FileError(
-            f"{name}: does not exist; give the name of a file that gearchaos branches has written"
+            f"{name}: does not exist; give the name of a file that {kind.command} has written"
         ) from error
     except Exception as error:
         # h5py raises nearly any kind of exception for a damaged file.
         raise FileError(
-            f"{name}: is no file of branches ({printable(reason(error))}); {remedy}"
+            f"{name}: is no file of {kind.content} ({printable(reason(error))}); {remedy}"
         ) from error
 
 
-def _check_schema(name: str, metadata: Mapping[str, Any]) -> None:
+def _check_schema(name: str, metadata: Mapping[str, Any], kind: FileKind) -> None:
     """Raise a FileError for a file of another kind or of a later format."""
-    kind, version = str(metadata.get("schema", "")), str(metadata.get("schema_version", ""))
-    if kind != SCHEMA:
+    schema, version = str(metadata.get("schema", "")), str(metadata.get("schema_version", ""))
+    if schema != kind.schema:
         raise FileError(
-            f"{name}: holds no branches (its schema is {printable(kind) or 'not given'}); give a "
-            "file that gearchaos branches has written"
+            f"{name}: holds no {kind.content} (its schema is {printable(schema) or 'not given'}); "
+            f"give a file that {kind.command} has written"
         )
-    if version.split(".")[0] != SCHEMA_VERSION.split(".")[0]:
+    major = kind.version.split(".")[0]
+    if version.split(".")[0] != major:
         raise FileError(
-            f"{name}: has format {printable(version)}, and this gearchaos reads "
-            f"{SCHEMA_VERSION.split('.')[0]}.x; install another version of gearchaos"
+            f"{name}: has format {printable(version)}, and this gearchaos reads {major}.x; "
+            "install another version of gearchaos"
         )
 
 
@@ -103,7 +132,7 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bra
         name: stored.values_of(name, one) for name, one in datasets.items() if texts[name] is None
     }
     notes = {name: stored.scalars_of(datasets[name]) for name in arrays}
-    described = {name: _described(name, datasets[name], notes[name]) for name in arrays}
+    described = {name: described_as(name, datasets[name], notes[name]) for name in arrays}
     states = str(notes[STATE]["flag_meanings"]).split()
     sections = [described[SECTION + state] for state in states]
     known = {"arclength", "stable", "lyapunov_exponent", "branch_of_point", POINT}
@@ -124,7 +153,7 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bra
             int(period),
             part(parameter.name, number),
             part("arclength", number),
-            _section(arrays, "", states, of == number, int(period)),
+            section_in(arrays, "", states, of == number, int(period)),
             part("multiplier_real", number) + 1j * part("multiplier_imaginary", number),
             part("lyapunov_exponent", number),
             tuple(one for at, one in specials(int(period)) if at == number),
@@ -136,15 +165,17 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bra
     return BranchSet(parameter, tuple(sections), branches, metadata, quantities)
 
 
-def _described(name: str, dataset: h5py.Dataset, notes: Mapping[str, Any]) -> Variable:
+def described_as(
+    name: str, dataset: h5py.Dataset, notes: Mapping[str, Any], start: str = OF_SPECIAL
+) -> Variable:
     """Return the description of a variable without its values."""
     units, long_name, symbol = (str(notes.get(key, "")) for key in ("units", "long_name", "symbol"))
     dims = stored.dims_of(name, dataset, notes, {})
-    dtype, scale = stored.dtype_of(name, dataset), scale_of(name.removeprefix(OF_SPECIAL))
+    dtype, scale = stored.dtype_of(name, dataset), scale_of(name.removeprefix(start))
     return Variable(name, dims, dtype, units, long_name, symbol, scale=scale)
 
 
-def _section(
+def section_in(
     arrays: Mapping[str, Array], start: str, states: Sequence[str], chosen: Any, period: int
 ) -> Floats:
     """Return the section (points, period, states) of some points."""
@@ -164,7 +195,7 @@ def _read_specials(
     )
 
     def specials(period: int) -> list[tuple[int, SpecialPoint]]:
-        sections = _section(arrays, OF_SPECIAL, states, slice(None), period)
+        sections = section_in(arrays, OF_SPECIAL, states, slice(None), period)
         return [
             (
                 int(arrays[name["branch"]][at]),

@@ -85,6 +85,10 @@ class Method:
     is_kept : callable
         ``is_kept(system, plan, scene)``: whether all that is prepared stays in memory between
         calls.
+    gap_terms : callable or None
+        ``gap_terms(system, plan, scene, states, flanks, at)``: the gap of an element within a step
+        as a polynomial; None for the cubic through value and rate at both ends. See
+        `gaps.gap_polynomials`.
     maps_per_step(scene)
         Returns how many numbers are prepared for one step.
     workspace(scene)
@@ -112,6 +116,7 @@ class Method:
     amplification: Callable[[NDArray[np.complex128]], Floats]
     stable_reach: Callable[[Floats], Floats] | None
     is_kept: Callable[[Any, Plan, Scene], bool]
+    gap_terms: Callable[..., Floats] | None
     maps_per_step: Any
     workspace: Any
     begin_lane: Any

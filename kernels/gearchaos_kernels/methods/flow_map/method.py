@@ -9,6 +9,7 @@ import numpy as np
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import aligned_memory, slots_of
 from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.methods.flow_map.along import gap_terms
 from gearchaos_kernels.methods.flow_map.crossings import resolve
 from gearchaos_kernels.methods.flow_map.layout import (
     Work,
@@ -115,6 +116,7 @@ FLOW_MAP = Method(
     amplification=lambda z: np.exp(z.real),
     stable_reach=None,
     is_kept=maps_are_kept,
+    gap_terms=gap_terms,
     maps_per_step=maps_per_step,
     workspace=workspace,
     begin_lane=begin_lane,

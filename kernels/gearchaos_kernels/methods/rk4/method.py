@@ -151,6 +151,7 @@ RK4 = Method(
     amplification=amplification,
     stable_reach=stable_reach,
     is_kept=lambda _system, _plan, _scene: True,
+    gap_terms=None,
     maps_per_step=maps_per_step,
     workspace=workspace,
     begin_lane=begin_lane,

@@ -1,0 +1,185 @@
+"""Boundaries of periodic orbits over two parameters: over a map, and on a page of their own."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import Stroke, withStroke
+
+from gearchaos.arrays import Floats
+from gearchaos.errors import FigureError
+from gearchaos.figures.labels import label_of
+from gearchaos.figures.lanes import Between
+from gearchaos.figures.page import Page, continued, footnote, legend_below, page
+from gearchaos.figures.style import BLACK, BLUE, GREEN, PURPLE, SINGLE_COLUMN_MM, VERMILION
+from gearchaos.records.boundary import (
+    CUSP,
+    FLIP_NEIMARK_SACKER,
+    FOLD_FLIP,
+    FOLD_NEIMARK_SACKER,
+    GRAZING_FLIP,
+    GRAZING_FOLD,
+    GRAZING_NEIMARK_SACKER,
+    POINT_KINDS,
+    STRONG_RESONANCE_11,
+    STRONG_RESONANCE_12,
+    WEAKER_RESONANCES,
+)
+from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBLING
+from gearchaos.results.files.boundary_file import BoundarySet
+
+LINES: dict[str, dict[str, Any]] = {
+    FOLD: {"color": BLACK, "linestyle": "-"},
+    PERIOD_DOUBLING: {"color": PURPLE, "linestyle": (0, (5, 1.5))},
+    NEIMARK_SACKER: {"color": GREEN, "linestyle": (0, (5, 1.5, 1, 1.5))},
+    GRAZING: {"color": VERMILION, "linestyle": (0, (1, 1.2))},
+}
+"""Line of each kind of boundary."""
+
+MARKERS: dict[str, dict[str, Any]] = {
+    CUSP: {"marker": "^", "color": BLACK},
+    STRONG_RESONANCE_11: {"marker": "o", "color": BLACK},
+    STRONG_RESONANCE_12: {"marker": "s", "color": PURPLE},
+    **{kind: {"marker": "d", "color": GREEN} for kind in WEAKER_RESONANCES},
+    FOLD_FLIP: {"marker": "D", "color": BLUE},
+    FOLD_NEIMARK_SACKER: {"marker": "v", "color": GREEN},
+    FLIP_NEIMARK_SACKER: {"marker": "<", "color": GREEN},
+    GRAZING_FOLD: {"marker": "X", "color": VERMILION},
+    GRAZING_FLIP: {"marker": "P", "color": VERMILION},
+    GRAZING_NEIMARK_SACKER: {"marker": "*", "color": VERMILION},
+}
+"""Marker and colour of each kind of point of codimension 2."""
+
+_HALO: Any = {"linewidth": 2.0, "foreground": "white", "alpha": 0.8}
+
+
+def draw_boundaries(
+    axes: Axes, found: BoundarySet, parameters: Sequence[str] | None = None
+) -> list[Line2D]:
+    """Draw boundaries into axes over two parameters, with their points of codimension 2.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes with one parameter along x and the other along y, such as those of `parameter_map`.
+        Their limits stay.
+    found : BoundarySet
+        The boundaries.
+    parameters : sequence of str, optional
+        Names of the parameters along x and y, by default in the order of the file.
+
+    Returns
+    -------
+    list of Line2D
+        One entry for the legend for each kind of line and marker.
+
+    Raises
+    ------
+    FigureError
+        If the boundaries are not over these parameters.
+    """
+    order = _order(found, parameters)
+    names: dict[str, Line2D] = {}
+    limits = axes.get_xlim(), axes.get_ylim()
+    several = len({one.period for one in found.boundaries}) > 1
+    for one in found.boundaries:
+        label = f"{one.kind}, period {one.period}" if several else one.kind
+        look: dict[str, Any] = {"linewidth": 1.0 if one.period == 1 else 0.7, **LINES[one.kind]}
+        # A boundary of one point could not be followed; a dot shows where it is.
+        dot: dict[str, Any] = {"marker": ".", "ms": 3.0} if one.arclength.size == 1 else {}
+        (line,) = axes.plot(*one.values[:, order].T, zorder=3.0, **look, **dot)
+        line.set_path_effects([withStroke(**_HALO)])
+        names.setdefault(label, line).set_label(label)
+    for one in found.boundaries:
+        for point in one.points:
+            place: Floats = point.values[order]
+            look = {"ms": 3.2, "mew": 0.7, "mfc": "white", "ls": "none", "zorder": 4.0}
+            (mark,) = axes.plot(*place[:, np.newaxis], **look, **MARKERS[point.kind])
+            mark.set_path_effects([Stroke(**_HALO), withStroke(linewidth=0.0)])
+            names.setdefault(point.kind, mark).set_label(point.kind)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    lines = [name for kind in LINES for name in sorted(names) if name.split(",")[0] == kind]
+    return [names[name] for name in [*lines, *(kind for kind in POINT_KINDS if kind in names)]]
+
+
+def _order(found: BoundarySet, parameters: Sequence[str] | None) -> list[int]:
+    """Return the columns of values along x and y."""
+    there = [one.name for one in found.parameters]
+    if parameters is None:
+        return [0, 1]
+    if {*parameters} != {*there}:
+        raise FigureError(
+            f"the boundaries are over {' and '.join(there)}, and the map is over "
+            f"{' and '.join(parameters)}; give the boundaries of this map"
+        )
+    return [there.index(name) for name in parameters]
+
+
+def add_boundaries(figure: Page, found: BoundarySet, parameters: Sequence[str]) -> None:
+    """Draw boundaries into all maps of a page of `map_page`, with a legend below.
+
+    Parameters
+    ----------
+    figure : Page
+        The page.
+    found, parameters
+        As for `draw_boundaries`.
+
+    Raises
+    ------
+    FigureError
+        If the boundaries are not over these parameters.
+    """
+    with continued(figure):
+        handles = [draw_boundaries(axes, found, parameters) for axes in figure.axes]
+        if handles[0]:
+            # The legend takes the place of the footnote, which becomes its title.
+            width = figure.get_size_inches()[0] * 25.4
+            columns = 2 if width < 1.5 * SINGLE_COLUMN_MM else 5
+            legend_below(figure, handles[0], figure.get_supxlabel() or None, columns)
+            footnote(figure, " ")
+
+
+def boundaries_page(
+    found: BoundarySet,
+    *,
+    between: Between = (None, None),
+    width_mm: float = SINGLE_COLUMN_MM,
+    height_mm: float | None = None,
+) -> Page:
+    """Draw boundaries over both parameters.
+
+    Parameters
+    ----------
+    found : BoundarySet
+        The boundaries.
+    between : (float or None, float or None)
+        Part of the first parameter's range to show; None is the end of the boundaries.
+    width_mm, height_mm : float
+        Size of the page.
+
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
+    Raises
+    ------
+    FigureError
+        If there are no boundaries.
+    """
+    if not found.boundaries:
+        raise FigureError("nothing to draw: the file holds no boundary")
+    with page(width_mm, height_mm or 30.0 + 0.8 * width_mm) as figure:
+        axes = figure.subplots()
+        values = np.concatenate([one.values for one in found.boundaries])
+        (x, y), (low, high) = values.T, between
+        axes.set_xlim(x.min() if low is None else low, x.max() if high is None else high)
+        margin = 0.03 * (float(np.ptp(y)) or 1.0)
+        axes.set_ylim(y.min() - margin, y.max() + margin)
+        handles = draw_boundaries(axes, found)
+        axes.set(xlabel=label_of(found.parameters[0]), ylabel=label_of(found.parameters[1], 34))
+        legend_below(figure, handles, str(found.metadata.get("title", "")) or None, 2)
+    return figure
