@@ -73,10 +73,11 @@ def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
         ) as server,
     ):
         try:
-            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page = browser.new_page(viewport={"width": 800, "height": 600})
             page.set_default_timeout(AT_MOST)
             page.goto(server.stdout.readline().strip())
-            page.locator(".bk-Figure >> nth=5").wait_for() if kind != "map" else None
+            # A chart, and the four panels of the motion.
+            page.locator(".bk-Figure >> nth=4").wait_for()
             page.locator("pre:has-text('response')").wait_for()
             seen = entries_drawn(page, gearchaos.open_result(path))
             page.close()

@@ -209,7 +209,8 @@ def test_h5dump_shows_the_contact(path):
 
 def command(*arguments: str) -> list[str]:
     settings = [part for override in SHORT for part in ("--set", override)]
-    return [str(FULL), "--periods", str(PERIODS), *settings, *arguments]
+    periods = () if "--periods" in arguments else ("--periods", str(PERIODS))
+    return [str(FULL), *periods, *settings, *arguments]
 
 
 @pytest.mark.slow

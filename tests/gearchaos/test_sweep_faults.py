@@ -41,10 +41,12 @@ def test_a_fault_of_the_configuration_is_one_line_and_code_2(tmp_path, fault):
     section = ("--set", 'outputs.section=["delta_5"]')  # Belongs to every scene.
     ended = sweep(tmp_path, *section, "--set", override)
     assert (ended.code, ended.out) == (2, "")
-    (line,) = ended.err.splitlines()
+    line, *causes = ended.err.splitlines()
     assert line.startswith("gearchaos sweep: error: ")
     assert message in line
     assert len(line) < 1300
+    # The only further line names the value that is the probable cause.
+    assert causes == [] or (len(causes) == 1 and f"{override.split('=')[0]} = " in causes[0])
     assert names_in(tmp_path) == ["gears.toml"]
 
 
