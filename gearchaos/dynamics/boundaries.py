@@ -297,7 +297,8 @@ def _half(equations: Equations, start: OnBoundary) -> tuple[list[OnBoundary], st
             return points, EDGE
         if _ends_in_resonance(points):
             # The curve continues as one of neutral saddles, which is no boundary.
-            return points, LOST
+            onward = trial.reference.cosine > 0.0
+            return points, STRONG_RESONANCE_11 if onward else STRONG_RESONANCE_12
         bend = (trial.tangent - here.tangent) / length
         if len(points) > 3 and _meets(here, trial, start):
             return [*points[:-1], start._replace(tangent=trial.tangent)], CLOSED_CURVE
