@@ -134,6 +134,10 @@ class TracedBoundary(NamedTuple):
                 return True
         return False
 
+    def passes(self, place: Floats) -> bool:
+        """Whether the boundary comes closer to a place (states + 2,) than `NEAR`."""
+        return self._nearest(place) is not None
+
     def _nearest(self, place: Floats) -> tuple[Floats, Floats, Reference] | None:
         """Return the place of the boundary next to another one, its tangent and its reference.
 

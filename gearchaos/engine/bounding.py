@@ -42,9 +42,6 @@ LINES, PERIODS = 4, 1
 COARSE = 24
 """Values of each parameter of the map that is computed from a configuration."""
 
-NEXT_TO = 1e-3
-"""Distance at which a Neimark-Sacker curve is taken to pass through a resonance."""
-
 APPROXIMATE = 1e-4
 """Length of the stretch of a branch in which a start is located; the equations then correct it."""
 
@@ -243,11 +240,9 @@ class _BoundarySearch:
                     self._add(turning, begun)
 
     def _passes(self, equations: Equations, start: OnBoundary) -> bool:
-        """Whether a known boundary of the same kind has a point next to the beginning of another."""
+        """Whether a known boundary of the same kind passes by the beginning of another."""
         return any(
-            np.min(np.linalg.norm(one.places - start.place, axis=1)) < NEXT_TO
-            for one in self.found
-            if _alike(one.equations, equations)
+            _alike(one.equations, equations) and one.passes(start.place) for one in self.found
         )
 
     @cached_property
