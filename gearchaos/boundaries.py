@@ -5,9 +5,10 @@ continued as curves over both parameters: folds, period doublings, Neimark-Sacke
 grazing of each flank. Points of codimension 2 are located on them: cusps, resonances 1:1 to 1:4,
 fold-flip points, and points where a grazing meets another boundary.
 
-INPUT is the result of a sweep of two parameters with labels, or a configuration, of which a coarse
-map is computed first. The curves are written to an HDF5 file; gearchaos plot draws it over the map.
-The path of the file goes to stdout, the table of the curves and everything else to stderr.
+INPUT is the result of a sweep of two parameters with labels, or a configuration. For a
+configuration a coarse map is computed first. The curves are written to an HDF5 file; gearchaos plot
+draws it over the map. The path of the file goes to stdout, the table of the curves and everything
+else to stderr.
 """
 
 from pathlib import Path

@@ -166,7 +166,7 @@ class Controller:
         Examples
         --------
         >>> controller.control(3).gain.shape
-        (3, 1, 6)
+        (3, 2, 6)
         """
         lanes = whole_number("lanes", lanes, least=1)
         given, periods = self.settings, len(self.gain)

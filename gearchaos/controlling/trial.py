@@ -45,7 +45,7 @@ class ControlTrial(NamedTuple):
     after: dict[str, float]
 
     def drawing(self) -> ControlDrawing:
-        """Return what a page shows of the trial.
+        """Return the contents of a page about the trial.
 
         Returns
         -------

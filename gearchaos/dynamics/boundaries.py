@@ -134,6 +134,10 @@ class TracedBoundary(NamedTuple):
                 return True
         return False
 
+    def passes(self, place: Floats) -> bool:
+        """Whether the boundary comes closer to a place (states + 2,) than `NEAR`."""
+        return self._nearest(place) is not None
+
     def _nearest(self, place: Floats) -> tuple[Floats, Floats, Reference] | None:
         """Return the place of the boundary next to another one, its tangent and its reference.
 
@@ -297,7 +301,8 @@ def _half(equations: Equations, start: OnBoundary) -> tuple[list[OnBoundary], st
             return points, EDGE
         if _ends_in_resonance(points):
             # The curve continues as one of neutral saddles, which is no boundary.
-            return points, LOST
+            onward = trial.reference.cosine > 0.0
+            return points, STRONG_RESONANCE_11 if onward else STRONG_RESONANCE_12
         bend = (trial.tangent - here.tangent) / length
         if len(points) > 3 and _meets(here, trial, start):
             return [*points[:-1], start._replace(tangent=trial.tangent)], CLOSED_CURVE

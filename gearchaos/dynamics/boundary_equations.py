@@ -45,7 +45,7 @@ PARAMETERS = 2
 
 
 class Reference(NamedTuple):
-    """What a test function is continued from: the values at a neighbouring point.
+    """Values at a neighbouring point, from which a test function is continued.
 
     Attributes
     ----------

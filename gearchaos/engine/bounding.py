@@ -9,7 +9,12 @@ from gearchaos_kernels import METHODS, LaneSystem, steps_taken
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, trace_boundary, unstarted
-from gearchaos.dynamics.boundary_equations import PARAMETERS, Equations
+from gearchaos.dynamics.boundary_equations import (
+    PARAMETERS,
+    Equations,
+    OnBoundary,
+    Reference,
+)
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.engine.branching import BranchRange, BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
@@ -24,8 +29,8 @@ from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.progress import say
-from gearchaos.records.boundary import BOUNDARY_KINDS, Boundary, BoundaryPoint
-from gearchaos.records.branch import BRANCH_POINT, GRAZING
+from gearchaos.records.boundary import BOUNDARY_KINDS, RESONANCES, Boundary, BoundaryPoint
+from gearchaos.records.branch import BRANCH_POINT, GRAZING, NEIMARK_SACKER
 from gearchaos.records.period import coordinate_scale
 from gearchaos.results.files.boundary_file import BoundarySet
 from gearchaos.results.reading.result import Result
@@ -214,8 +219,31 @@ class _BoundarySearch:
         if start is None:
             self.found.append(unstarted(equations, guess, special.point))
             return
-        if not any(_alike(one.equations, equations) and one.holds(start) for one in self.found):
-            self.found.append(trace_boundary(equations, start))
+        self._add(equations, start)
+
+    def _add(self, equations: Equations, start: OnBoundary) -> None:
+        """Follow the boundary through a point, unless it is known, and what begins on it."""
+        if any(_alike(one.equations, equations) and one.holds(start) for one in self.found):
+            return
+        boundary = trace_boundary(equations, start)
+        self.found.append(boundary)
+        if equations.kind == NEIMARK_SACKER:
+            return
+        turning = equations._replace(kind=NEIMARK_SACKER, flank=-1)
+        for located in boundary.located:
+            check()
+            if located.kind in RESONANCES:
+                # The curve of pairs with the product 1 passes through the resonance.
+                point, pair = located.point, Reference(cosine=RESONANCES[located.kind])
+                begun = turning.corrected(point.place, point.tangent, pair)
+                if begun is not None and not self._passes(turning, begun):
+                    self._add(turning, begun)
+
+    def _passes(self, equations: Equations, start: OnBoundary) -> bool:
+        """Whether a known boundary of the same kind passes by the beginning of another."""
+        return any(
+            _alike(one.equations, equations) and one.passes(start.place) for one in self.found
+        )
 
     @cached_property
     def steps(self) -> tuple[int, int]:

@@ -17,7 +17,7 @@ COLOURS = (BLACK, BLUE, ORANGE, VERMILION)
 
 
 class ControlDrawing(NamedTuple):
-    """What a page about a controller shows.
+    """The contents of a page about a controller.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ def control_page(shown: ControlDrawing) -> Page:
     Parameters
     ----------
     shown : ControlDrawing
-        What the page shows.
+        The contents of the page.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def control_page(shown: ControlDrawing) -> Page:
     Examples
     --------
     >>> from gearchaos.controlling.trial import try_controller
-    >>> figure = control_page(try_controller(controller, 10, 300).drawing())
+    >>> figure = figures.control_page(try_controller(controller, 10, 300).drawing())
     """
     with page(DOUBLE_COLUMN_MM, 110.0) as figure:
         panels = figure.subplots(2, 2)

@@ -23,7 +23,7 @@ RESONANCES = {"1:1 resonance": 1.0, "1:2 resonance": -1.0}
 """Resonances at which a Neimark-Sacker curve ends, with the cosine of the angle of its pair."""
 STRONG_RESONANCE_11, STRONG_RESONANCE_12 = RESONANCES
 WEAKER_RESONANCES = {"1:3 resonance": -0.5, "1:4 resonance": 0.0}
-"""Resonances through which it continues, with the cosine of the angle of its pair."""
+"""Resonances that do not end such a curve, with the cosine of the angle of its pair."""
 FOLD_FLIP = "fold-flip"
 FOLD_NEIMARK_SACKER = "fold meets Neimark-Sacker"
 FLIP_NEIMARK_SACKER = "period doubling meets Neimark-Sacker"

@@ -1,4 +1,4 @@
-"""What a controlled motion is: its section, the inputs of the controller, and its capture."""
+"""A motion with control: its section, the inputs of the controller, and its capture."""
 
 from typing import NamedTuple
 

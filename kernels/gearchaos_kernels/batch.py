@@ -154,7 +154,7 @@ def _require_supported(scene: Scene, plan: Plan, states: int) -> None:
 class _Beginning(NamedTuple):
     """States and tangent vectors at tau = 0, both (lanes, states), and the controllers.
 
-    None stands for tangent vectors of equal components, and for no controllers.
+    Tangent vectors that are None have equal components.
     """
 
     start: Floats
@@ -191,7 +191,7 @@ def _integrate_share(
         _turns(orders, share.steps),
         plan.frame,
     )
-    # An empty array stands for no controller.
+    # Without a controller the array is empty.
     control: Actuation | Floats = np.zeros(0)
     if begins.control:
         control = _actuation(begins.control, system, step, plan, outcome.inputs)

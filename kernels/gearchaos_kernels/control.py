@@ -5,8 +5,8 @@ the period. With a target orbit r and a state x at the beginning of the period::
 
     u = -K_j (x - r_j)   if this is at most the limit, otherwise 0
 
-j is the point of the orbit that is nearest. Instead of x, a controller may use an estimate z from
-measured states y = C x + noise, which it corrects and predicts once per period::
+j is the number of the nearest point of the orbit. Instead of x, a controller may use an estimate z.
+It corrects z by the measured states y = C x + noise, and predicts it for the next period::
 
     z <- z + L_j (y - C z),    then    z <- r_j+1 + A_j (z - r_j) + b_j u
 
@@ -30,7 +30,7 @@ from gearchaos_kernels.plan import Floats
 
 @dataclass(frozen=True)
 class Feedback:
-    """What the compiled loop contains of a controller.
+    """The parts of a controller that the compiled loop contains.
 
     Attributes
     ----------

@@ -137,7 +137,9 @@ def names(tmp_path_factory):
             gearchaos.run(config).save(f"{name}.h5")
         response = gearchaos.load_config("sweeps/pan2021.toml", [*SHORT, *ONE_VALUE])
         gearchaos.respond(response, periods=8).save("response.h5")
+        system = gearchaos.System("sweeps/pan2021.toml", pitch_error=10.75)
         yield {
+            "controller": gearchaos.Controller(system, system.orbit(period=2)),
             "gearchaos": gearchaos,
             "figures": figures,
             "np": np,
