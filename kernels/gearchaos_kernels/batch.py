@@ -191,10 +191,7 @@ def _integrate_share(
         _turns(orders, share.steps),
         plan.frame,
     )
-    # Without a controller the array is empty.
-    control: Actuation | Floats = np.zeros(0)
-    if begins.control:
-        control = _actuation(begins.control, system, step, plan, outcome.inputs)
+    control = _actuation(begins.control, system, step, plan, outcome.inputs)
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
@@ -216,9 +213,14 @@ def _integrate_share(
 
 
 def _actuation(
-    control: Control, system: LaneSystem, step: Floats, plan: Plan, inputs: Floats
-) -> Actuation:
-    """Return controllers with how their input acts on lanes; ``step``, ``inputs`` as in a batch."""
+    control: Control | None, system: LaneSystem, step: Floats, plan: Plan, inputs: Floats
+) -> Actuation | Floats:
+    """Return controllers with how their input acts on lanes; an empty array if there are none.
+
+    ``step`` (lanes,): length of a step in units of tau; ``inputs``: see `Outcome`.
+    """
+    if control is None:
+        return np.zeros(0)
     model = provider_of(system.flags())
     column = model.lane._fields.index(model.actuated)
     one, none = (

@@ -219,7 +219,7 @@ def act(memory, block, period, batch, control, given, scene):
         if scene.tangent is not None:
             if used:
                 varied = varied_input(memory, slot, index, nearest, control, scale, scene)
-        predict(memory, slot, index, nearest, effort, varied, control, scale, scene)
+        predict(memory, slot, index, nearest, (effort, varied), control, scale, scene)
         strength = control.strength[index]
         coefficient = batch.coefficients[index, column] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
@@ -342,9 +342,12 @@ def varied_input(memory, slot, index, nearest, control, scale, scene):
 
 
 @scalar
-def predict(memory, slot, index, nearest, effort, varied, control, scale, scene):
-    """Keep what the next period needs: the predicted estimate, or the states of the delay."""
-    at, states = control_rows(scene), scale.shape[0]
+def predict(memory, slot, index, nearest, chosen, control, scale, scene):
+    """Keep what the next period needs: the predicted estimate, or the states of the delay.
+
+    ``chosen``: the input and its variation along the tangent vector.
+    """
+    at, states, (effort, varied) = control_rows(scene), scale.shape[0], chosen
     for earlier in range(at.delay - 1, -1, -1):
         for state in range(states):
             row = earlier * states + state

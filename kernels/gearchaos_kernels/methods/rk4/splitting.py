@@ -53,9 +53,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
     lane = read_lane(memory, slot, scene)
     state = state_before(memory, slot, scene)
     after = state_of(memory, slot, scene)
-    tangent = state
-    if scene.tangent is not None:
-        tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
+    tangent = tangent_before(memory, slot, state, scene)
     number, (done, begin), (until, end) = at.number, first, last
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
@@ -95,6 +93,14 @@ def split_part(memory, slot, at, first, last, tables, scene):
         write_branches(memory, slot, branches_at(gaps_after, lane, scene), scene)
     if fraction <= 1.0:
         memory[(rows(scene).crossings + 2) * STRIDE + slot] += 1.0
+
+
+@scalar
+def tangent_before(memory, slot, state, scene):
+    """Return the tangent vector before the step, or a state that is not read if there is none."""
+    if scene.tangent is None:
+        return state
+    return read_state(memory, rows(scene).tangent_before, slot, scene)
 
 
 @scalar
