@@ -92,8 +92,7 @@ def integrate(
     control : Control, optional
         The controller of every lane; by default there is none.
     periods : array of int, shape (lanes,), optional
-        Recorded periods of every lane, at most those of the plan, which is the default. The section
-        of a lane with fewer begins with NaN, and its growth ends with 0.
+        At most those of the plan, the default; shorter sections begin with NaN, growth ends with 0.
 
     Returns
     -------
@@ -110,17 +109,14 @@ def integrate(
     ::
 
         outcome = integrate(pairs, start, Plan(200, 300, 100, 100, tangent=True))
-        exponents = outcome.growth.mean(axis=1) / pairs.mesh_period
     """
-    lanes, states = start.shape[0], len(system.states)
-    scene = scene_of(system, plan, control)
+    (lanes, states), scene = start.shape, scene_of(system, plan, control)
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
     recorded = _recorded_periods(plan, periods, outcome)
-    begins = _Beginning(start, tangent_start, control)
     for prepared in METHODS[plan.method].prepare(system, plan, scene, recorded):
         share = with_periods(prepared, recorded, plan.lanes_together(states))
         steps_taken[share.order] = share.steps[share.order]
-        _integrate_share(system, share, begins, plan, outcome, scene)
+        _integrate_share(system, share, _Begin(start, tangent_start, control), plan, outcome, scene)
     return _per_tau(system, plan, outcome, steps_taken, recorded, scene)
 
 
@@ -151,7 +147,7 @@ def _require_supported(scene: Scene, plan: Plan, states: int) -> None:
         raise ValueError("control needs a model with a steady input")
 
 
-class _Beginning(NamedTuple):
+class _Begin(NamedTuple):
     """States and tangent vectors at tau = 0, both (lanes, states), and the controllers.
 
     Tangent vectors that are None have equal components.
@@ -165,7 +161,7 @@ class _Beginning(NamedTuple):
 def _integrate_share(
     system: LaneSystem,
     share: Share,
-    begins: _Beginning,
+    begins: _Begin,
     plan: Plan,
     outcome: Outcome,
     scene: Scene,

@@ -60,7 +60,7 @@ PHYSICAL = {
         f"pitch_error.{gear}.{key}": None
         for gear in ("driving", "driven")
         for key in (
-            *("cumulative_um", "single_um", "file", "column"),
+            *("cumulative_um", "single_um", "file", "column", "tooth_column"),
             *("holds", "counted", "flank"),
         )
     },

@@ -112,7 +112,11 @@ def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
     assert lane.axes == ("pitch_error",)
     assert "first_realisation = 1\n" in str(lane.metadata["configuration_resolved"])
     run("export", "drawn.h5", "drawn.csv")
-    assert (tmp_path / "drawn.csv").read_text().startswith("pitch_error,realisation,start,")
+    assert (
+        (tmp_path / "drawn.csv")
+        .read_text()
+        .startswith("pitch_error [1],realisation [1],start [1],")
+    )
 
 
 def test_boundaries_are_refined_with_the_gear_pair_of_the_slice(tmp_path):

@@ -129,9 +129,7 @@ def test_what_cannot_be_reported_is_refused(settings, message):
         load_config(PAN2021, settings)
 
 
-@pytest.mark.parametrize("order", ["'1/5'", "48"])
-def test_a_record_without_whole_cycles_and_too_few_steps_are_refused_with_a_remedy(order):
-    config = load_config(PAN2021, (*SHORT, f"outputs.orders=[{order},'1/2',1]"))
-    multiple = "10, such as 20" if "5" in order else "2, such as 12"
-    with pytest.raises(gearchaos.ConfigurationError, match=rf"multiple of {multiple}, .*below 48"):
+def test_too_few_steps_for_an_order_are_refused_with_a_remedy():
+    config = load_config(PAN2021, (*SHORT, "outputs.orders=[48,'1/2',1]"))
+    with pytest.raises(gearchaos.ConfigurationError, match=r"orders: 48: .* orders below 48"):
         gearchaos.run(config)

@@ -3,6 +3,7 @@
 import atexit
 import functools
 import json
+import logging
 import os
 import shutil
 import site
@@ -284,6 +285,10 @@ def _refused(tmp_path, monkeypatch, caplog) -> str:
     """Return why a folder is not used; a private temporary one is used instead."""
     monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "parent" / "cache"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    # Packages that other tests use may have configured the logging of this process.
+    monkeypatch.setattr(logging.getLogger("gearchaos"), "disabled", False)
+    monkeypatch.setattr(logging.getLogger("gearchaos"), "propagate", True)
+    caplog.set_level(logging.WARNING, "gearchaos")
     folder = cache_folder("name")
     assert folder.parent == tmp_path
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
