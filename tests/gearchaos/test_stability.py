@@ -173,7 +173,7 @@ def test_the_refusal_names_lanes_and_steps():
     stiffness = np.linspace(10.0, 1000.0, 100)
     steps = fewest(Effects(axial=False), pan2021(1.0, transverse_stiffness_g=stiffness))
     first = stiffness[steps > 60][0]
-    text, *_ = refused.value.problems
+    (text,) = refused.value.problems
     assert text.split(": ", 1)[1] == (
         "integration.steps_per_period = 60: RK4 is unstable below "
         f"{steps.max()} steps per period for {np.sum(steps > 60)} of 100 lanes "
@@ -191,7 +191,7 @@ def test_the_refusal_of_two_parameters_names_both():
     )
     with pytest.raises(ConfigurationError) as refused:
         simulation(*both)
-    (text,) = refused.value.problems
+    text, *_ = refused.value.problems
     assert "1 of 2 lanes (mesh_frequency = 0.01, damping_ratio = 2); raise it to" in text
 
 
