@@ -33,7 +33,6 @@ KINDS = {
         "grades",
         (*SHORT, "sweep.count=2", "pitch_error.realisations=2", "integration.steps_per_period=40"),
     ),
-    "train": ("two_stage", (*SHORT, "sweep.count=3")),
 }
 AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machine.
 MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
