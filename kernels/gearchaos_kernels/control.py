@@ -82,7 +82,7 @@ class Control(NamedTuple):
     correction : array, shape (lanes, points, states, signals)
         The matrices L of the estimate.
     delay : int
-        Mesh periods of a delayed feedback, which takes the first gain; 0 for a target orbit.
+        Mesh periods of a delayed feedback, with the gain of the nearest point; 0 for a target orbit.
 
     Examples
     --------
