@@ -82,7 +82,8 @@ class Control(NamedTuple):
     correction : array, shape (lanes, points, states, signals)
         The matrices L of the estimate.
     delay : int
-        Mesh periods of a delayed feedback, with the gain of the nearest point; 0 for a target orbit.
+        Mesh periods of a delayed feedback, 0 for a target orbit. The gain is that of the nearest
+        point.
 
     Examples
     --------
