@@ -8,11 +8,14 @@ from gearchaos.dynamics.orbits import polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.resonances import resonances
 from gearchaos.engine.run_plan import plan_run
+from gearchaos.models.declared import declare_model
 from gearchaos.models.registry import system_of
 
-from .oscillators import OscillatorConfiguration
+from ..kernels.oscillator import Oscillators
 
 METHODS = ("rk4", "flow_map")
+DEFAULTS = {"damping": 0.05, "half_clearance": 1.0, "load": 0.1, "amplitude": 0.1}
+OscillatorConfiguration = declare_model("oscillator", Oscillators, ("stop",), **DEFAULTS)
 SWEEP = {"parameter": "frequency", "from": 0.4, "to": 1.9, "count": 16}
 
 
@@ -77,10 +80,7 @@ def test_a_file_of_it_has_its_own_names(tmp_path):
     result = gearchaos.run(configured("rk4"))
     result.save(tmp_path / "oscillator.h5")
     again = gearchaos.open_result(tmp_path / "oscillator.h5")
-    assert (
-        again.variables["section_x"].long_name
-        == "displacement of the mass at the stroboscopic section"
-    )
+    assert again.variables["section_x"].long_name == "displacement of x at the stroboscopic section"
     assert np.array_equal(again["section_x"], result["section_x"])
 
 
@@ -92,3 +92,14 @@ def test_its_eigenfrequency_is_reported_before_a_run():
 def test_an_unknown_parameter_names_those_of_the_model():
     with pytest.raises(gearchaos.ConfigurationError, match="did you mean `damping`"):
         configured("rk4", sweep={**SWEEP, "parameter": "dampingg"})
+
+
+@pytest.mark.parametrize(
+    ("elements", "defaults", "said"),
+    [(("stop",), {"mass": 1.0}, "mass"), (("one", "other"), {}, "number of elements")],
+)
+def test_a_declaration_that_does_not_fit_the_lanes_is_refused(elements, defaults, said):
+    with pytest.raises(ValueError, match=said):
+        declare_model("other_oscillator", Oscillators, elements, **defaults)
+    with pytest.raises(gearchaos.ConfigurationError, match="is the name of no model"):
+        gearchaos.run({"model": {"kind": "other_oscillator"}, "sweep": SWEEP})

@@ -44,12 +44,8 @@ OSCILLATOR = Model(
     coordinates=X,
     lane=Lane,
     forcing_at=lambda lane, phase, _scene: lane.load + lane.amplitude * phase.cosine,
-    elements_at=lambda lane, _drive, _scene: (
-        Element(lane.stiffness, lane.damping, lane.half_clearance),
-    ),
-    gaps_at=lambda state, _lane, _drive, _scene: (
-        Gap(state.position.x, state.rate.x, state.rate.x),
-    ),
+    elements_at=lambda lane, _, __: (Element(lane.stiffness, lane.damping, lane.half_clearance),),
+    gaps_at=lambda state, _, __, ___: (Gap(state.position.x, state.rate.x, state.rate.x),),
     accelerations=lambda _state, pushes, drive, _lane, _scene: X(drive - pushes[0].force),
     actuated="load",
     observed=("x",),
