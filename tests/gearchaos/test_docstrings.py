@@ -1,5 +1,6 @@
 """Docstrings of public names: numpydoc sections, and examples that run."""
 
+import ast
 import doctest
 import inspect
 import re
@@ -160,3 +161,19 @@ def test_the_examples_run(names):
             runner.run(test, out=reports.append)
     assert runner.summarize(verbose=False).failed == 0, "".join(reports)
     assert runner.tries > 60
+
+
+def test_functions_are_short_and_have_few_arguments():
+    """Docstrings may be long; what a function does may not."""
+    found = 0
+    for path in (CLONE / "gearchaos").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            found += 1
+            documented = ast.get_docstring(node) is not None
+            first = node.body[0].end_lineno if documented else node.lineno
+            assert node.end_lineno - first <= 50, f"{path.name}: {node.name}"
+            arguments = [one.arg for one in ast.walk(node.args) if isinstance(one, ast.arg)]
+            assert len([one for one in arguments if one not in ("self", "cls")]) <= 8, node.name
+    assert found > 1500
