@@ -5,14 +5,15 @@ follows the tangent of the curve. A fold is a regular point of the curve. The mu
 therefore found on both sides of +1, however fast it changes with the parameter.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import Any, NamedTuple, Self, TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS
+from gearchaos.dynamics.side_by_side import Found, Search, run
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 FIRST_STEP, LONGEST_CURVE_STEP, SHORTEST_STEP = 1e-3, 0.05, 1e-10
@@ -136,8 +137,11 @@ class Curve(NamedTuple):
 
     Attributes
     ----------
-    system_at : callable
-        Returns the system of the lanes at shares of the way, (lanes,).
+    systems_at : callable
+        Returns the system of lanes from the numbers of their curves and the shares of the way, both
+        (lanes,). Curves that advance side by side have the same one.
+    number : int
+        The number of the curve.
     plan : Plan
         Records the period of the orbit with a tangent.
     periods : int
@@ -146,31 +150,18 @@ class Curve(NamedTuple):
         Scales of the states.
     """
 
-    system_at: Callable[[Floats], LaneSystem]
+    systems_at: Callable[[Integers, Floats], LaneSystem]
+    number: int
     plan: Plan
     periods: int
     scale: Floats
 
-    @classmethod
-    def through(
-        cls,
-        system_at: Callable[[Floats], LaneSystem],
-        plan: Plan,
-        periods: int,
-        point: Floats,
-        share: float,
-        contact: bool = False,
-    ) -> Self:
-        """Return the curve through the orbit with state ``point`` (states,) at a share of it.
-
-        ``contact``: whether the impacts of every orbit are counted.
-        """
-        system = system_at(np.array([share]))
-        whole = periods * system.repeats_after
-        steps, method = plan.steps_per_period, plan.method
-        plan = Plan(steps, 0, whole, whole, tangent=True, contact=contact, method=method)
-        section = integrate(system, point[np.newaxis], plan).every(system.repeats_after).section
-        return cls(system_at, plan, periods, coordinate_scale(section)[0])
+    def through(self, point: Floats, share: float) -> Self:
+        """Return the curve with the scales of the orbit with state ``point`` at a share of it."""
+        system = self.systems_at(np.array([self.number]), np.array([share]))
+        passed = integrate(system, point[np.newaxis], self.plan)
+        section = passed.every(system.repeats_after).section
+        return self._replace(scale=coordinate_scale(section)[0])
 
     def corrected(self, guess: Floats, direction: Floats) -> CurvePoint | None:
         """Find the point of the curve next to a guess, in the plane normal to a direction.
@@ -178,26 +169,20 @@ class Curve(NamedTuple):
         ``guess`` and ``direction``: shape (states + 1,). Newton's method; None where it does not
         converge.
         """
-        correction = self.correcting(guess, direction)
-        try:
-            request = next(correction)
-            while True:
-                request = correction.send(self._defect(request))
-        except StopIteration as ended:
-            found: CurvePoint | None = ended.value
-            return found
+        return run(self.correcting(guess, direction), defects_of)
 
-    def correcting(self, guess: Floats, direction: Floats) -> "Search[CurvePoint | None]":
-        """Correct a guess as `corrected`; yields `Request` and is sent their `Defect`."""
+    def correcting(self, guess: Floats, direction: Floats) -> "Finding[CurvePoint | None]":
+        """Return the search of `corrected`."""
         place, last = guess, np.inf
         by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
-            defect, slopes, passed = yield Request(place, by_share)
+            ((defect, slopes, passed),) = yield [Request(self, place, by_share)]
             size = float(np.max(np.abs(defect)))
             # Rounding of the state grows with the largest multiplier.
             if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
                 if by_share is not None and np.linalg.norm(place - guess) > NEAR_ENOUGH:
-                    slopes = (yield Request(place)).slopes
+                    (again,) = yield [Request(self, place)]
+                    slopes = again.slopes
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, size, passed)
@@ -220,15 +205,11 @@ class Curve(NamedTuple):
         plan = self.plan._replace(recorded_periods=whole, section_points=whole)
         return self._replace(periods=2 * self.periods, plan=plan)
 
-    def jacobian(self, place: Floats) -> Floats:
-        """Return the Jacobian of the map over the period, in the scales, (states, states)."""
+    def jacobian(self, place: Floats) -> "Finding[Floats]":
+        """Search the Jacobian of the map over the period, in the scales, (states, states)."""
         states = self.scale.size
-        slopes: Floats = self._defect(Request(place, np.zeros(states))).slopes[:, :-1]
-        return slopes + np.eye(states)
-
-    def _defect(self, request: "Request") -> "Defect":
-        """Return the defect at a place."""
-        return defects_of([self], [request], lambda _numbers, shares: self.system_at(shares))[0]
+        (defect,) = yield [Request(self, place, np.zeros(states))]
+        return defect.slopes[:, :-1] + np.eye(states)
 
     def defect_of(self, request: "Request", passed: Outcome) -> "Defect":
         """Return the defect at a place, from the motion of its lanes."""
@@ -264,12 +245,15 @@ class Request(NamedTuple):
 
     Attributes
     ----------
+    curve : Curve
+        The curve.
     place : array, shape (states + 1,)
         The state in its scales, then the share of the way.
     by_share : array, shape (states,), or None
         The derivative of the map by the share of the way, if it is known.
     """
 
+    curve: Curve
     place: Floats
     by_share: Floats | None = None
 
@@ -299,51 +283,45 @@ class Defect(NamedTuple):
     passed: Outcome
 
 
-_Found = TypeVar("_Found")
-Search = Generator[Request, Defect, _Found]
-"""Yields places of a curve, is sent their defects, and returns what was sought."""
+Finding: TypeAlias = Search[Request, Defect, Found]
+"""Yields places of curves, is sent their defects, and returns the result."""
 
 
-def defects_of(
-    curves: Sequence[Curve],
-    requests: Sequence[Request],
-    systems_at: Callable[[Integers, Floats], LaneSystem],
-) -> list[Defect]:
+def defects_of(requests: Sequence[Request]) -> list[Defect]:
     """Return the defects at places of curves, one each, from one integration.
 
-    The curves differ in periods and scales only. ``systems_at`` returns the system of lanes from
-    numbers of curves and shares of the way, both (lanes,).
+    The curves differ in their numbers, periods and scales only.
     """
-    states = curves[0].scale.size
+    first = requests[0].curve
+    states = first.scale.size
     shares = [request.shares() for request in requests]
     known = np.array([len(one) for one in shares])
-    system = systems_at(np.repeat(np.arange(len(curves)), known), np.concatenate(shares))
+    numbers = np.repeat([request.curve.number for request in requests], known)
+    system = first.systems_at(numbers, np.concatenate(shares))
     # One lane for each column of the Jacobian, and one for the difference by the parameter.
     copies = np.concatenate([[states, 1][:count] for count in known])
     lanes, counts = system.of(np.repeat(np.arange(copies.size), copies)), states + known - 1
-    points = [one.place[:-1] * curve.scale for curve, one in zip(curves, requests, strict=True)]
+    points = [request.place[:-1] * request.curve.scale for request in requests]
     tangents = np.concatenate([np.eye(states)[[*range(states), 0]][:count] for count in counts])
-    periods = np.array([curve.plan.recorded_periods for curve in curves])
+    periods = np.array([request.curve.plan.recorded_periods for request in requests])
     longest = int(periods.max())
-    plan = curves[0].plan._replace(recorded_periods=longest, section_points=longest)
+    plan = first.plan._replace(recorded_periods=longest, section_points=longest)
     start, own = np.repeat(points, counts, axis=0), np.repeat(periods, counts)
     passed = integrate(lanes, start, plan, tangent_start=tangents, periods=own)
-    found, first = [], 0
-    for curve, request, whole, count in zip(curves, requests, periods, counts, strict=True):
-        parts: Any = (array[first : first + count] for array in passed)
+    found, at = [], 0
+    for request, whole, count in zip(requests, periods, counts, strict=True):
+        parts: Any = (array[at : at + count] for array in passed)
         one = Outcome(*parts)
         one = one._replace(section=one.section[:, -whole:], growth=one.growth[:, :whole])
-        found.append(curve.defect_of(request, one.every(system.repeats_after)))
-        first += count
+        found.append(request.curve.defect_of(request, one.every(system.repeats_after)))
+        at += count
     return found
 
 
 def end_of_curve(
     curve: Curve, point: Floats, share: float, limit: float, width: float
-) -> Search[End]:
+) -> Finding[End]:
     """Follow a curve from a stable orbit onwards to where it loses stability or turns back.
-
-    Yields places of the curve and is sent their defects, so that curves advance side by side.
 
     Parameters
     ----------
@@ -390,7 +368,7 @@ def along_the_way(states: int) -> Floats:
 
 def _at_share(
     curve: Curve, one: CurvePoint, other: CurvePoint, share: float
-) -> Search[CurvePoint | None]:
+) -> Finding[CurvePoint | None]:
     """Return the point of the curve at a share between the shares of two points."""
     part = (share - one.share) / (other.share - one.share)
     guess = one.place + part * (other.place - one.place)
@@ -398,7 +376,7 @@ def _at_share(
     return (yield from curve.correcting(guess, along_the_way(guess.size - 1)))
 
 
-def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> Search[End]:
+def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> Finding[End]:
     """Bisect the stretch of a curve in which it loses stability or turns back."""
     for _ in range(MOST_HALVINGS):
         chord = beyond.place - inner.place

@@ -12,7 +12,7 @@ branch, there is a special point between them, which is then located on the curv
 - grazing: an element begins or ceases to meet a flank.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -22,11 +22,13 @@ from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import (
     FIRST_STEP,
     SHORTEST_STEP,
-    STRAIGHT,
     Curve,
     CurvePoint,
+    Finding,
     along_the_way,
+    defects_of,
 )
+from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.records.branch import (
     BRANCH_POINT,
     CLOSED_CURVE,
@@ -132,8 +134,8 @@ class TracedBranch(NamedTuple):
         """Period in excitation periods."""
         return self.curve.periods
 
-    def holds(self, share: float, section: Floats, tolerance: float) -> bool:
-        """Return whether an orbit lies on the branch, whichever of its points the branch has.
+    def holds(self, share: float, section: Floats, tolerance: float) -> Finding[bool]:
+        """Search whether an orbit lies on the branch, whichever of its points the branch has.
 
         Parameters
         ----------
@@ -158,7 +160,7 @@ class TracedBranch(NamedTuple):
             if tolerance < distance <= NEIGHBOURING:
                 # Between two of its points, the branch is not straight.
                 guess[-1] = share
-                found = self.curve.corrected(guess, along_the_way(guess.size - 1))
+                found = yield from self.curve.correcting(guess, along_the_way(guess.size - 1))
                 if found is not None:
                     distance = _distance(scaled, found.place)
                 elif distance <= UNDECIDED:
@@ -176,7 +178,14 @@ def _distance(section: Floats, place: Floats) -> float:
 def trace(
     curve: Curve, start: CurvePoint, one_way: bool = False, located: float = LOCATED
 ) -> TracedBranch:
-    """Follow a branch from one of its points in both directions.
+    """Return the branch of `tracing`."""
+    return run(tracing(curve, start, one_way, located), defects_of)
+
+
+def tracing(
+    curve: Curve, start: CurvePoint, one_way: bool = False, located: float = LOCATED
+) -> Finding[TracedBranch]:
+    """Follow a branch from one of its points in both directions side by side.
 
     Parameters
     ----------
@@ -194,26 +203,27 @@ def trace(
     TracedBranch
         The branch with its special points.
     """
-    ahead, last = _half(curve, start)
-    behind, first = [start], "" if not one_way else HALVING
-    if not one_way and last != CLOSED_CURVE:
-        behind, first = _half(curve, start._replace(tangent=-start.tangent))
+    starts = [start] if one_way else [start, start._replace(tangent=-start.tangent)]
+    (ahead, last), *back = yield from together([_half(curve, one) for one in starts])
+    behind, first = back[0] if back else ([start], HALVING)
+    if last == CLOSED_CURVE:
+        behind, first = [start], last
     points = [one._replace(tangent=-one.tangent) for one in behind[:0:-1]] + ahead
-    ends = (last, last) if last == CLOSED_CURVE else (first, last)
-    return _with_specials(curve, points, ends, located)
+    return (yield from _with_specials(curve, points, (first, last), located))
 
 
 def _with_specials(
     curve: Curve, points: list[CurvePoint], ends: tuple[str, str], located: float
-) -> TracedBranch:
+) -> Finding[TracedBranch]:
     """Return the branch through points, with its special points located and among its points."""
+    located_between = yield from together(
+        [_specials_between(curve, one, other, located) for one, other in pairwise(points)]
+    )
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
-    for one, other in pairwise(points):
+    for (one, other), between in zip(pairwise(points), located_between, strict=True):
         chord = other.place - one.place
-        between = _specials_between(curve, one, other, located)
-        between.sort(key=lambda special: float((special[1].place - one.place) @ chord))
-        for special in between:
+        for special in sorted(between, key=lambda it: float((it[1].place - one.place) @ chord)):
             found.append((len(joined), special))
             joined.append(special[1])
         joined.append(other)
@@ -226,8 +236,8 @@ def _with_specials(
     return TracedBranch(curve, joined, places, positions, specials, ends)
 
 
-def doubled_start(curve: Curve, doubling: CurvePoint) -> CurvePoint | None:
-    """Return the first point of the branch of twice the period that begins at a period doubling.
+def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | None]:
+    """Search the first point of the branch of twice the period that begins at a period doubling.
 
     The state moves along the eigenvector of the multiplier -1, by `SIDEWAYS`.
 
@@ -244,18 +254,19 @@ def doubled_start(curve: Curve, doubling: CurvePoint) -> CurvePoint | None:
         The point of ``curve.doubled()``, with the tangent away from the doubling; None if it is not
         found.
     """
-    values, vectors = np.linalg.eig(curve.jacobian(doubling.place))
+    values, vectors = np.linalg.eig((yield from curve.jacobian(doubling.place)))
     vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
     direction = np.append(vector, 0.0) / np.linalg.norm(vector)
-    return curve.doubled().corrected(doubling.place + SIDEWAYS * direction, direction)
+    guess = doubling.place + SIDEWAYS * direction
+    return (yield from curve.doubled().correcting(guess, direction))
 
 
-def _half(curve: Curve, start: CurvePoint) -> tuple[list[CurvePoint], str]:
+def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], str]]:
     """Follow a branch in the direction of a point's tangent; return its points and why it ends."""
     points, step, bend = [start], FIRST_STEP, np.zeros_like(start.place)
     while len(points) < MOST_POINTS:
         here = points[-1]
-        trial, leaves = _next(curve, here, step, bend)
+        trial, leaves = yield from _next(curve, here, step, bend)
         if trial is None or not _succeeds(here, trial, step):
             step /= 2.0
             if step < SHORTEST_STEP:
@@ -271,7 +282,7 @@ def _half(curve: Curve, start: CurvePoint) -> tuple[list[CurvePoint], str]:
         if leaves:
             return points, EDGE
         bend = (trial.tangent - here.tangent) / length
-        if len(points) > 3 and _meets(curve, here, trial, start):
+        if len(points) > 3 and (yield from _meets(curve, here, trial, start)):
             return points, CLOSED_CURVE
         step = min(2.0 * step, LONGEST)
     return points, TOO_MANY
@@ -279,14 +290,14 @@ def _half(curve: Curve, start: CurvePoint) -> tuple[list[CurvePoint], str]:
 
 def _next(
     curve: Curve, here: CurvePoint, step: float, bend: Floats
-) -> tuple[CurvePoint | None, bool]:
-    """Return the next point of a curve, or None, and whether it is the edge of the range.
+) -> Finding[tuple[CurvePoint | None, bool]]:
+    """Search the next point of a curve, or None, and whether it is the edge of the range.
 
     ``bend`` (states + 1,): derivative of the tangent by the arclength.
     """
     guess = here.place + step * here.tangent + 0.5 * step**2 * bend
     if 0.0 <= guess[-1] <= 1.0:
-        trial = curve.corrected(guess, here.tangent)
+        trial = yield from curve.correcting(guess, here.tangent)
         if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
             return None, False
         if 0.0 <= trial.share <= 1.0:
@@ -295,7 +306,7 @@ def _next(
     reach = (edge - here.share) / here.tangent[-1] if here.tangent[-1] else np.inf
     guess = here.place + min(max(reach, 0.0), step) * here.tangent
     guess[-1] = edge
-    trial = curve.corrected(guess, along_the_way(guess.size - 1))
+    trial = yield from curve.correcting(guess, along_the_way(guess.size - 1))
     if trial is None or np.linalg.norm(trial.place - here.place) > 2.0 * step:
         return None, True
     # The tangent of a point at the edge has the direction of the parameter.
@@ -315,17 +326,24 @@ def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
     return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
 
 
-def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint) -> bool:
-    """Whether the first point of a branch lies between two successive ones, in its direction."""
-    chord, away = trial.place - here.place, start.place - here.place
-    share = float(away @ chord) / float(chord @ chord)
-    aside = np.linalg.norm(away - share * chord)
-    if not 0.0 <= share <= 1.0 or aside > NEIGHBOURING or trial.tangent @ start.tangent < STRAIGHT:
+def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint) -> Finding[bool]:
+    """Search whether the first orbit of a branch lies between two others, in its direction.
+
+    A curve of a longer period may come back to this orbit at another of its section points.
+    """
+    if trial.tangent[-1] * start.tangent[-1] <= 0.0:
         return False
-    guess = here.place + share * chord
-    guess = guess - ((guess - start.place) @ start.tangent) * start.tangent
-    found = curve.corrected(guess, start.tangent)
-    return found is not None and bool(np.max(np.abs(found.place - start.place)) < SAME_PLACE)
+    chord = trial.place - here.place
+    length = np.linalg.norm(chord)
+    for point in start.section / curve.scale:
+        target = np.append(point, start.share)
+        along = float((target - here.place) @ chord) / length
+        guess = here.place + along * chord / length
+        if 0.0 <= along <= length and np.linalg.norm(target - guess) <= NEIGHBOURING:
+            found = yield from curve.correcting(guess, chord / length)
+            if found is not None and np.max(np.abs(found.place - target)) < SAME_PLACE:
+                return True
+    return False
 
 
 def _test_functions(point: CurvePoint) -> dict[str, float]:
@@ -342,10 +360,26 @@ def _test_functions(point: CurvePoint) -> dict[str, float]:
 
 def _specials_between(
     curve: Curve, one: CurvePoint, other: CurvePoint, located: float
-) -> list[tuple[str, CurvePoint, int]]:
-    """Return kind, point and flank of the special points between two points of a curve."""
+) -> Finding[list[tuple[str, CurvePoint, int]]]:
+    """Search kind, point and flank of the special points between two points of a curve."""
+    sought = [*_changes_of_sign(one, other), *_changes_of_impacts(one, other)]
+    points = yield from together(
+        [_located(curve, one, other, function, located) for _, function, _ in sought]
+    )
+    return [
+        (kind, point, flank)
+        for (kind, _, flank), point in zip(sought, points, strict=True)
+        if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers))
+    ]
+
+
+_Sought = tuple[str, Callable[[CurvePoint], float], int]
+"""Kind of a special point, the function that changes its sign there, and the flank or -1."""
+
+
+def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
+    """Yield the kinds of special points of the multipliers between two points."""
     before, after = _test_functions(one), _test_functions(other)
-    found = []
     for kind in before:
         if before[kind] * after[kind] >= 0.0:
             continue
@@ -356,11 +390,7 @@ def _specials_between(
         def test_function(at: CurvePoint, kind: str = kind) -> float:
             return _test_functions(at)[kind]
 
-        point = _located(curve, one, other, test_function, located)
-        if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers)):
-            found.append((kind, point, -1))
-    found += [(GRAZING, *graze) for graze in _grazings(curve, one, other, located)]
-    return found
+        yield kind, test_function, -1
 
 
 def _has_pair_on_circle(multipliers: Complex) -> bool:
@@ -370,11 +400,8 @@ def _has_pair_on_circle(multipliers: Complex) -> bool:
     return bool(nearest[0].imag != 0.0)
 
 
-def _grazings(
-    curve: Curve, one: CurvePoint, other: CurvePoint, located: float
-) -> list[tuple[CurvePoint, int]]:
-    """Return the points between two points at which impacts appear or vanish, with their flanks."""
-    found: list[tuple[CurvePoint, int]] = []
+def _changes_of_impacts(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
+    """Yield the flanks on which impacts appear or vanish between two points."""
     for flank, (before, after) in enumerate(zip(one.impacts, other.impacts, strict=True)):
         if before == after:
             continue
@@ -382,10 +409,7 @@ def _grazings(
         def changed(at: CurvePoint, flank: int = flank, before: int = before) -> float:
             return 1.0 if at.impacts[flank] == before else -1.0
 
-        point = _located(curve, one, other, changed, located)
-        if point is not None:
-            found.append((point, flank))
-    return found
+        yield GRAZING, changed, flank
 
 
 def _located(
@@ -394,8 +418,8 @@ def _located(
     other: CurvePoint,
     function: Callable[[CurvePoint], float],
     located: float,
-) -> CurvePoint | None:
-    """Return the point between two points of a curve at which a function changes its sign.
+) -> Finding[CurvePoint | None]:
+    """Search the point between two points of a curve at which a function changes its sign.
 
     The method of false position with halved values (Illinois), or bisection where the function only
     has a sign. None if a point between them is not found.
@@ -409,7 +433,7 @@ def _located(
             break
         share = 0.5 if number % 3 == 2 or abs(low) == abs(high) else low / (low - high)
         share = min(max(share, 1e-3), 1.0 - 1e-3)
-        middle = curve.corrected(one.place + share * chord, chord / length)
+        middle = yield from curve.correcting(one.place + share * chord, chord / length)
         if middle is None:
             return nearest if length < 1e-7 else None
         nearest, value = middle, function(middle)

@@ -6,15 +6,15 @@ of the elements are continuous, so that the map over a period has a continuous d
 """
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Integers, Mask
-from gearchaos.dynamics.arclength import Curve, End, Search, defects_of, end_of_curve
+from gearchaos.dynamics.arclength import Curve, End, defects_of, end_of_curve
 from gearchaos.dynamics.orbits import Orbits, polish
+from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability
 
 LONGEST_SHARE = 1.0 / 16.0
@@ -242,39 +242,29 @@ class _Lanes:
         A curve is followed at most one long step beyond the place where the orbit was missed.
         """
         share = np.minimum(np.maximum(self._share, self._end) + LONGEST_SHARE, 1.0)
-        limits, curves, searches = share.tolist(), {}, {}
+        limits, curves, searches = share.tolist(), {}, []
         for lane in lanes:
-            system_at = partial(self._systems, np.array([lane]), 0)
             at, point = float(self._share[lane]), self.stable.points[lane]
-            curve = Curve.through(system_at, self._plan, int(self._period[lane]), point, at)
+            curves[lane] = self._curve(lane).through(point, at)
             width = float(self._smallest[lane])
-            curves[lane] = curve
-            searches[lane] = end_of_curve(curve, point, at, limits[lane], width)
-        ends = self._ends(curves, searches)
-        return [self._continued(lane, ends[lane], curves[lane], limits[lane]) for lane in lanes]
+            searches.append(end_of_curve(curves[lane], point, at, limits[lane], width))
+        ends = run(together(searches), defects_of)
+        return [
+            self._continued(lane, end, curves[lane], limits[lane])
+            for lane, end in zip(lanes, ends, strict=True)
+        ]
 
-    def _systems(self, lanes: Integers, numbers: int | Integers, shares: Floats) -> LaneSystem:
+    def _curve(self, lane: int) -> Curve:
+        """Return the curve of the orbit of a lane, without scales."""
+        period = int(self._period[lane])
+        steps, method = self._plan.steps_per_period, self._plan.method
+        whole = period * self._systems(np.array([lane]), np.zeros(1)).repeats_after
+        plan = Plan(steps, 0, whole, whole, tangent=True, method=method)
+        return Curve(self._systems, lane, plan, period, np.ones(self.stable.points.shape[1]))
+
+    def _systems(self, lanes: Integers, shares: Floats) -> LaneSystem:
         """Return the systems of some of the lanes, by their numbers, at shares of their ways."""
-        chosen = lanes[numbers]
-        return self._system_at(self._first[chosen] + shares * self._way[chosen])
-
-    def _ends(self, curves: dict[int, Curve], searches: dict[int, Search[End]]) -> dict[int, End]:
-        """Advance searches along the curves of lanes side by side, and return what they find."""
-        ends: dict[int, End] = {}
-        answers: dict[int, Any] = dict.fromkeys(searches)
-        while True:
-            requests = {}
-            for lane, answer in answers.items():
-                try:
-                    requests[lane] = searches[lane].send(answer)
-                except StopIteration as ended:
-                    ends[lane] = ended.value
-            if not requests:
-                return ends
-            systems_at = partial(self._systems, np.array([*requests]))
-            moved = [curves[lane] for lane in requests]
-            defects = defects_of(moved, [*requests.values()], systems_at)
-            answers = dict(zip(requests, defects, strict=True))
+        return self._system_at(self._first[lanes] + shares * self._way[lanes])
 
     def _continued(self, lane: int, end: End, curve: Curve, limit: float) -> bool:
         """Set a lane to the end of its followed curve; return whether the curve continues."""

@@ -190,9 +190,8 @@ class _BoundarySearch:
         branches = BranchSearch(
             self.over.line(number, value), self.run, self.longest, APPROXIMATE, self.scale
         )
-        for motion in branches.motions(line, known.axis_name(self.over.parameters[1 - number])):
-            check()
-            branches.follow(motion)
+        across = known.axis_name(self.over.parameters[1 - number])
+        branches.follow(branches.motions(line, across))
         for branch in branches.found:
             for special in branch.specials:
                 check()

@@ -1,23 +1,29 @@
 """The branches of a sweep: the curves of the periodic orbits it found, and their doublings."""
 
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, integrate
 
-from gearchaos.arrays import Floats
-from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
-from gearchaos.dynamics.branches import LOCATED, TracedBranch, doubled_start, trace
+from gearchaos.arrays import Floats, Integers
+from gearchaos.dynamics.arclength import Curve, CurvePoint, Finding, along_the_way, defects_of
+from gearchaos.dynamics.branches import (
+    LOCATED,
+    SIDEWAYS,
+    Special,
+    TracedBranch,
+    doubled_start,
+    tracing,
+)
+from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.errors import ConfigurationError
-from gearchaos.interrupts import check
 from gearchaos.models import swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
@@ -94,9 +100,7 @@ def find_branches(
     over = BranchRange(systems, float(values[0]), float(values[-1]))
     search = BranchSearch(over, plan_run(config), longest)
     with one_thread():
-        for motion in search.motions(result, swept[0]):
-            check()
-            search.follow(motion)
+        search.follow(search.motions(result, swept[0]))
         return _described(search, result.variables[swept[0]])
 
 
@@ -127,12 +131,16 @@ class BranchRange(NamedTuple):
         """Return the systems at shares of the way (lanes,)."""
         return self.system_of(self.value(shares))
 
+    def systems_at(self, _numbers: Integers, shares: Floats) -> LaneSystem:
+        """Return the systems at shares of the way (lanes,): the same for all curves."""
+        return self.system_at(shares)
+
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
         whole = period * self.system_at(np.zeros(1)).repeats_after
         steps, method = plan.steps_per_period, plan.method
         plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
-        return Curve(self.system_at, plan, period, scale)
+        return Curve(self.systems_at, 0, plan, period, scale)
 
 
 class BranchSearch:
@@ -154,14 +162,14 @@ class BranchSearch:
         self.found: list[TracedBranch] = []
         self._scale = scale
 
-    def motions(self, result: Result, axis: str) -> Iterator[_Motion]:
-        """Yield the periodic motions of the result, in the order of the parameter."""
+    def motions(self, result: Result, axis: str) -> list[_Motion]:
+        """Return the periodic motions of the result, in the order of the parameter."""
         period = result.lanes("period")
         (lanes,) = np.nonzero((period > 0) & (period <= self.longest))
         shares = self.over.share(result.along(axis)[lanes])
         lanes, shares = lanes[np.argsort(shares, kind="stable")], np.sort(shares, kind="stable")
         if not lanes.size:
-            return
+            return []
         states = result.lanes("end_state")[lanes]
         system = self.over.system_at(shares)
         periods = int(period[lanes].max()) * system.repeats_after
@@ -179,29 +187,62 @@ class BranchSearch:
         # One scale for all branches: that of one motion would be too small along the branch.
         if self._scale is None:
             self._scale = coordinate_scale(sections.reshape(1, -1, states.shape[1]))[0]
-        for lane, share, section in zip(lanes, shares, sections, strict=True):
-            n = int(period[lane])
-            yield _Motion(float(share), section[:n], n)
+        periods_of = period[lanes].tolist()
+        return [
+            _Motion(share, section[:n], n)
+            for share, section, n in zip(shares.tolist(), sections, periods_of, strict=True)
+        ]
 
-    def follow(self, motion: _Motion) -> None:
-        """Follow the orbit of a motion, unless it lies on a known branch, and all its doublings."""
-        if self._known(motion, NEAR):
-            return
+    def follow(self, motions: Sequence[_Motion]) -> None:
+        """Follow the orbits of motions that lie on no known branch, one by one, with doublings."""
+        known = 0
+        while motions:
+            # Only branches found since then may hold more of them.
+            held = run(together([self._holds(one, NEAR, known) for one in motions]), defects_of)
+            motions = [one for one, is_held in zip(motions, held, strict=True) if not is_held]
+            known = len(self.found)
+            if motions:
+                self._follow(motions[0])
+                motions = motions[1:]
+
+    def _follow(self, motion: _Motion) -> None:
+        """Follow the orbit of a motion; then all branches that begin or end on it side by side."""
         assert self._scale is not None, "motions() gives the scales"
-        waiting = deque([motion])
+        curve = self.over.curve(self.run.plan, motion.period, self._scale)
+        waiting = [self._from_motion(curve, motion)]
         while waiting:
-            motion = waiting.popleft()
-            curve = self.over.curve(self.run.plan, motion.period, self._scale)
-            guess = np.append(motion.section[-1] / curve.scale, motion.share)
-            start = curve.corrected(guess, along_the_way(guess.size - 1))
-            if start is None or self._known(_motion_at(curve, start), SAME):
-                continue
-            self._add(trace(curve, start, located=self.located), waiting)
+            waiting = [
+                search
+                for branch in run(together(waiting), defects_of)
+                if branch is not None and not run(self._found_before(branch), defects_of)
+                for search in self._added(branch)
+            ]
 
-    def _add(self, branch: TracedBranch, waiting: "deque[_Motion]") -> None:
-        """Add a branch unless it is known, and those that begin at its period doublings."""
-        if self._found_before(branch):
-            return
+    def _from_motion(self, curve: Curve, motion: _Motion) -> Finding[TracedBranch | None]:
+        """Search the branch of a motion; None if its orbit is not found or known."""
+        guess = np.append(motion.section[-1] / curve.scale, motion.share)
+        start = yield from curve.correcting(guess, along_the_way(guess.size - 1))
+        if start is not None and start.half_return < SIDEWAYS:
+            half = self.over.curve(self.run.plan, motion.period // 2, curve.scale)
+            motion = _Motion(start.share, start.section[: half.periods], half.periods)
+            return (yield from self._from_motion(half, motion))
+        return (yield from self._traced(curve, start))
+
+    def _from_doubling(self, curve: Curve, special: Special) -> Finding[TracedBranch | None]:
+        """Search the branch that begins at a period doubling; None if it is not found or known."""
+        start = yield from doubled_start(curve, special.point)
+        return (yield from self._traced(curve.doubled(), start, True))
+
+    def _traced(
+        self, curve: Curve, start: CurvePoint | None, one_way: bool = False
+    ) -> Finding[TracedBranch | None]:
+        """Follow a branch from one of its points, unless it is known."""
+        if start is None or (yield from self._holds(_motion_at(curve, start), SAME)):
+            return None
+        return (yield from tracing(curve, start, one_way, self.located))
+
+    def _added(self, branch: TracedBranch) -> Iterator[Finding[TracedBranch | None]]:
+        """Add a branch, and yield searches of those that begin or end on it."""
         self.found.append(branch)
         say(
             f"period {branch.period}: {len(branch.points)} orbits, "
@@ -211,28 +252,27 @@ class BranchSearch:
             if reason == HALVING:
                 middle = end.place[:-1] + end.halfway / 2.0
                 section = (middle * branch.curve.scale)[np.newaxis]
-                waiting.append(_Motion(end.share, section, branch.period // 2))
-        if 2 * branch.period > self.longest:
-            return
-        for special in branch.specials:
-            check()
+                half = self.over.curve(self.run.plan, branch.period // 2, branch.curve.scale)
+                yield self._from_motion(half, _Motion(end.share, section, branch.period // 2))
+        for special in branch.specials if 2 * branch.period <= self.longest else ():
             if special.kind == PERIOD_DOUBLING:
-                start, doubled = doubled_start(branch.curve, special.point), branch.curve.doubled()
-                if start is not None and not self._known(_motion_at(doubled, start), SAME):
-                    self._add(trace(doubled, start, True, self.located), waiting)
+                yield self._from_doubling(branch.curve, special)
 
-    def _found_before(self, branch: TracedBranch) -> bool:
-        """Whether most of some points in the middle of a branch lie on a branch that is known."""
+    def _found_before(self, branch: TracedBranch) -> Finding[bool]:
+        """Search whether most of some points amid a branch lie on a branch that is known."""
         chosen = np.unique(np.linspace(0, len(branch.points) - 1, 7).astype(int)[1:-1])
         motions = [_motion_at(branch.curve, branch.points[at]) for at in chosen]
-        return 2 * sum(self._known(one, SAME) for one in motions) > len(motions)
+        held = yield from together([self._holds(one, SAME) for one in motions])
+        return 2 * sum(held) > len(motions)
 
-    def _known(self, motion: _Motion, tolerance: float) -> bool:
-        """Whether a motion lies on a branch that has been found."""
-        return any(
-            branch.period == motion.period and branch.holds(motion.share, motion.section, tolerance)
-            for branch in self.found
-        )
+    def _holds(self, motion: _Motion, tolerance: float, first: int = 0) -> Finding[bool]:
+        """Search whether a motion lies on a branch that has been found, from the first on."""
+        for branch in self.found[first:]:
+            if branch.period == motion.period and (
+                yield from branch.holds(motion.share, motion.section, tolerance)
+            ):
+                return True
+        return False
 
 
 def _motion_at(curve: Curve, point: CurvePoint) -> _Motion:

@@ -95,7 +95,7 @@ class LinearConfiguration(MachineConfiguration):
                     faults.append(fault_of(f"model.{name}", fault, file))
         return ({**tables, "model": model, "files": files} if files else tables), faults
 
-    @property
+    @cached_property
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
         """The numbers that a sweep can vary, by their dotted path."""
         frequency = Parameter("frequency", "model.frequency", Range(gt=0), long_name="frequency")
@@ -129,20 +129,28 @@ class LinearConfiguration(MachineConfiguration):
         swept = {path: value for path, value in values.items() if path != "frequency"}
         tables = with_numbers(given, swept)
         elements: list[Clearance] = [*tables["clearance"].values()]
-        mass, stiffness, damping = self.matrices()
         return Machine(
             frequency=frequency,
-            mass=mass,
-            damping=damping,
-            stiffness=stiffness,
-            reaction=self._rows(one.reaction or one.gap for one in elements).T,
-            gap=self._rows(one.gap for one in elements),
+            **self._constant,
             force=self._forces(tables["force"], frequency),
             motion=self._waves([one.motion for one in elements]),
             contact_stiffness=self._waves([one.waves for one in elements]),
             contact_damping=np.array([one.damping for one in elements], dtype=np.float64),
             half_clearance=np.array([one.half_clearance for one in elements], dtype=np.float64),
         )
+
+    @cached_property
+    def _constant(self) -> dict[str, Floats]:
+        """Matrices that are the same in every lane, by name."""
+        mass, stiffness, damping = self.matrices()
+        elements = [*self.clearance.values()]
+        return {
+            "mass": mass,
+            "damping": damping,
+            "stiffness": stiffness,
+            "reaction": self._rows(one.reaction or one.gap for one in elements).T,
+            "gap": self._rows(one.gap for one in elements),
+        }
 
     def matrices(self) -> tuple[Floats, Floats, Floats]:
         """Return the mass, stiffness and damping matrices as given, each of shape (n, n)."""
@@ -160,7 +168,7 @@ class LinearConfiguration(MachineConfiguration):
 
     def _waves(self, given: list[Fourier | None]) -> Floats:
         """Return sums of waves by order, shape (sums, w)."""
-        orders = self._orders()
+        orders = self.kinds_of_elements.orders
         waves = np.zeros((len(given), 1 + 2 * len(orders)))
         for row, one in zip(waves, given, strict=True):
             if one is not None:
@@ -172,7 +180,7 @@ class LinearConfiguration(MachineConfiguration):
 
     def _forces(self, given: Mapping[str, Force], frequency: float) -> Floats:
         """Return the forces on all coordinates, shape (n, w)."""
-        orders = self._orders()
+        orders = self.kinds_of_elements.orders
         forces = np.zeros((len(self.model.coordinates), 1 + 2 * len(orders)))
         for one in given.values():
             at = 1 + 2 * orders.index(one.order)

@@ -1,6 +1,7 @@
 """A machine as the engine sees it: systems, parameters, loads and motions."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +15,7 @@ from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
 from gearchaos.models.protocol import Model, accelerations
 from gearchaos.models.stiffness_table import note_of, tables_in
+from gearchaos.outputs.listing import Catalogue
 from gearchaos.outputs.scales import Quantity
 
 
@@ -27,8 +29,12 @@ class MachineModel(Model):
 
     def __init__(self, config: MachineConfiguration) -> None:
         self._kinds = config.kinds_of_elements
-        self.catalogue = catalogue_of(self._kinds, self.units, self.angle)
         self.signals = tuple(f"{GAP}{name}" for name in self._kinds.elements)
+
+    @cached_property
+    def catalogue(self) -> Catalogue:  # type: ignore[override]
+        """All outputs that a result may have."""
+        return catalogue_of(self._kinds, self.units, self.angle)
 
     def system(
         self, config: MachineConfiguration, values: Mapping[str, Floats], effects: Collection[str]

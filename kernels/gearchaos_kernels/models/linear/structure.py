@@ -13,6 +13,7 @@ contain only the terms that a `Structure` lists.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from typing import NamedTuple
 
@@ -25,7 +26,14 @@ Entries = tuple[tuple[int, int], ...]
 def entries_of(matrices: NDArray[np.float64]) -> Entries:
     """Return the places (row, column) where a matrix is not 0; shape (lanes, rows, columns)."""
     there = np.any(matrices != 0.0, axis=0)
-    return tuple((int(row), int(column)) for row, column in np.argwhere(there))
+    return _places(there.tobytes(), there.shape)
+
+
+@lru_cache(maxsize=256)
+def _places(there: bytes, shape: tuple[int, ...]) -> Entries:
+    """Return the places that are not 0 in a matrix of bools; kept, as systems are often alike."""
+    matrix = np.frombuffer(there, dtype=np.bool_).reshape(shape)
+    return tuple((int(row), int(column)) for row, column in np.argwhere(matrix))
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,12 @@ class Structure:
     stiffness: Entries
     one_sided: tuple[bool, ...]
     damped_in_contact: tuple[bool, ...]
+
+    @cached_property
+    def indices(self) -> dict[str, tuple[list[int], list[int]]]:
+        """Rows and columns of the entries of every matrix, by its name."""
+        places = {name: np.array(getattr(self, name)).reshape(-1, 2) for name in MATRICES}
+        return {name: (at[:, 0].tolist(), at[:, 1].tolist()) for name, at in places.items()}
 
     @property
     def waves(self) -> int:
@@ -125,3 +139,7 @@ def numbered(structure: Structure, name: str) -> Iterator[tuple[int, int, int]]:
     first = sum(len(getattr(structure, one)) for one in MATRICES[: MATRICES.index(name)])
     for number, (row, column) in enumerate(getattr(structure, name)):
         yield first + number, row, column
+
+
+structure_of = lru_cache(maxsize=64)(Structure)
+"""Return the structure with these fields, always the same one."""

@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.linear.model import Linear
-from gearchaos_kernels.models.linear.structure import MATRICES, Structure, entries_of
+from gearchaos_kernels.models.linear.structure import (
+    MATRICES,
+    Structure,
+    entries_of,
+    structure_of,
+)
 from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
 from gearchaos_kernels.plan import Floats
 
@@ -89,7 +94,7 @@ class LinearSystems(LaneSystem):
     def structure(self) -> Structure:
         """Which numbers of the systems are not zero in some lane."""
         count = self.gap.shape[1]
-        return Structure(
+        return structure_of(
             coordinates=self.gap.shape[2],
             elements=count,
             orders=self.orders,
@@ -127,8 +132,7 @@ class LinearSystems(LaneSystem):
         }
         columns = []
         for name in MATRICES:
-            places = getattr(self.structure, name)
-            rows, entries = [list(one) for one in zip(*places, strict=True)] or ([], [])
+            rows, entries = self.structure.indices[name]
             factor = np.asarray(factors.get(name, 1.0))
             columns.append(self._matrix(name)[:, rows, entries] * factor)
         return np.concatenate(
