@@ -66,7 +66,7 @@ class Control(NamedTuple):
     limit : array, shape (lanes,)
         Largest absolute input; a larger one is replaced by 0.
     begins : int
-        Number of the mesh period in which the control begins.
+        Number of the mesh period in which the control begins, counted from tau = 0.
     repeats : int
         Mesh periods after which the excitation repeats. The number of points is a multiple.
     measured : array of int, shape (signals,)
@@ -149,6 +149,48 @@ class Control(NamedTuple):
             np.zeros((lanes, 0, states, states)),
         )
 
+    @property
+    def remembers(self) -> bool:
+        """Whether an estimate or earlier states act on the motion, beside the state itself."""
+        return self.delay > 0 or self.transition.shape[1] > 0
+
+    def of(self, chosen: Any) -> "Control":
+        """Return the controllers of some lanes.
+
+        Parameters
+        ----------
+        chosen : array of int or slice
+            Numbers of the lanes, in the order of the new controllers.
+
+        Returns
+        -------
+        Control
+            Their controllers.
+
+        Examples
+        --------
+        >>> point = np.zeros((3, 1, 6))
+        >>> Control.of_states(point, point, np.ones(3)).of([0, 0]).limit.shape
+        (2,)
+        """
+        return self._replace(**{name: getattr(self, name)[chosen] for name in OF_LANES})
+
+    def settled(self) -> "Control":
+        """Return the controllers as they act after their beginning, without noise.
+
+        Returns
+        -------
+        Control
+            Controllers that act in every mesh period.
+
+        Examples
+        --------
+        >>> point = np.zeros((1, 1, 6))
+        >>> Control.of_states(point, point, np.ones(1))._replace(begins=9).settled().begins
+        0
+        """
+        return self._replace(begins=0, noise=np.zeros_like(self.noise))
+
     def flags(self) -> Feedback:
         """Return what the compiled loop contains of the controller.
 
@@ -165,6 +207,20 @@ class Control(NamedTuple):
         """
         estimated = True if self.transition.shape[1] else None
         return Feedback(estimated, self.delay, self.points.shape[2])
+
+
+OF_LANES = (
+    "points",
+    "gain",
+    "scales",
+    "limit",
+    "noise",
+    "seeds",
+    "transition",
+    "response",
+    "correction",
+)
+"""Fields of `Control` with one row for each lane."""
 
 
 class Actuation(NamedTuple):
@@ -213,13 +269,15 @@ def act(memory, block, period, batch, control, given, scene):
             prepare(memory, slot, control.points[index], scale, scene)
         measure(memory, slot, index, phase, control, scale, scene)
         nearest = nearest_point(memory, slot, phase, control, index, scale, scene)
-        found = chosen_input(memory, slot, index, nearest, control, scale, scene)
-        used = period >= begins and abs(found) <= control.limit[index]
+        place, at = (index, nearest), control_rows(scene)
+        found = demanded(memory, slot, place, (at.known, at.kept), 1.0, control, scene)
+        used = phase >= begins and abs(found) <= control.limit[index]
         effort = found if used else 0.0
         varied = 0.0
         if scene.tangent is not None:
             if used:
-                varied = varied_input(memory, slot, index, nearest, control, scale, scene)
+                sources = at.known_varied, at.kept_varied
+                varied = demanded(memory, slot, place, sources, 0.0, control, scene)
         predict(memory, slot, index, nearest, (effort, varied), control, scale, scene)
         strength = control.strength[index]
         coefficient = batch.coefficients[index, column] + strength * effort
@@ -314,30 +372,20 @@ def nearest_point(memory, slot, phase, control, index, scale, scene):
 
 
 @scalar
-def chosen_input(memory, slot, index, nearest, control, scale, scene):
-    """Return the input that the gains demand, -K times the deviation."""
-    known, kept = control_rows(scene).known, control_rows(scene).kept
-    delay, states = control_rows(scene).delay, scale.shape[0]
+def demanded(memory, slot, place, sources, target, control, scene):
+    """Return the input that the gains demand, -K times a deviation, or its variation.
+
+    ``place``: the lane and the nearest point of the orbit; ``sources``: rows of what is known and
+    of what is kept; ``target``: 1 for the input, 0 for its variation, as the orbit does not vary.
+    """
+    (index, nearest), (known, kept) = place, sources
+    delay, states = control_rows(scene).delay, control.points.shape[2]
     total = 0.0
     for state in range(states):
-        reference = control.points[index, nearest, state]
+        reference = target * control.points[index, nearest, state]
         if delay > 0:
             reference = memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
         deviation = memory[(known + state) * STRIDE + slot] - reference
-        total -= control.gain[index, nearest, state] * deviation
-    return total
-
-
-@scalar
-def varied_input(memory, slot, index, nearest, control, scale, scene):
-    """Return the variation of the input along the tangent vector."""
-    known, kept = control_rows(scene).known_varied, control_rows(scene).kept_varied
-    delay, states = control_rows(scene).delay, scale.shape[0]
-    total = 0.0
-    for state in range(states):
-        deviation = memory[(known + state) * STRIDE + slot]
-        if delay > 0:
-            deviation -= memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
         total -= control.gain[index, nearest, state] * deviation
     return total
 

@@ -246,7 +246,8 @@ class GearPairs(LaneSystem):
         """Return the system of some lanes, in the order given."""
         teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[chosen])
         groups = Groups(*(group[chosen] for group in self.groups))
-        return self.replace(groups=groups, teeth=teeth)
+        control = self.control and self.control.of(chosen)
+        return self.replace(groups=groups, teeth=teeth, control=control)
 
 
 class MeshMotion(NamedTuple):
