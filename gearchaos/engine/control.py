@@ -13,11 +13,7 @@ from gearchaos.dynamics.controllers import ControlSettings, Designed, Target, co
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.target_orbits import TargetOrbits, machine_at, target_orbits
 from gearchaos.errors import ConfigurationError
-from gearchaos.records.control import (
-    NO_GAIN,
-    NO_ORBIT,
-    NOT_CAPTURED,
-)
+from gearchaos.records.control import NO_GAIN, NO_ORBIT, NOT_CAPTURED, OFF
 
 NUMBERS_PER_COUNTER = 4
 """Random numbers per Philox counter."""
@@ -62,7 +58,9 @@ class Controllers:
     def states_of(self, lanes: Integers, values: Mapping[str, Floats]) -> Codes:
         """Return `NOT_CAPTURED` for lanes with a controller, otherwise why they have none."""
         designs, rows = self._designs_of(lanes, values)
-        return np.array([state for _, state in designs], dtype=np.uint8)[rows]
+        states = np.array([state for _, state in designs], dtype=np.uint8)[rows]
+        off = self._limit(lanes, values) == 0.0
+        return np.where(off, np.uint8(OFF), states)
 
     def noise_of(self, lanes: Integers, values: Mapping[str, Floats]) -> Floats:
         """Return the noise of lanes in the scales of the states, (lanes,)."""

@@ -8,7 +8,7 @@ from gearchaos_kernels import Status
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.outputs.names import SECTION
-from gearchaos.records.control import CAPTURE_MEANINGS, CAPTURED, NO_GAIN, NO_ORBIT
+from gearchaos.records.control import CAPTURE_MEANINGS, CAPTURED, NO_GAIN, NO_ORBIT, OFF
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 CHANGE_MEANINGS = (
@@ -76,7 +76,7 @@ class Tally:
         self._mixed += int(np.count_nonzero(arrays.get("record", UNIFORM) == MIXED))
         if "capture" in arrays:
             counts = np.bincount(arrays["capture"], minlength=len(CAPTURE_MEANINGS))
-            self._controlled += int(counts.sum())
+            self._controlled += int(counts.sum() - counts[OFF])
             self._captured += int(counts[CAPTURED])
             self._without_orbit += int(counts[NO_ORBIT])
             self._without_gain += int(counts[NO_GAIN])

@@ -12,9 +12,9 @@ CLOSEST_REACH = 1e-6
 NOISE_REACH = 30.0
 """Largest distance of a captured motion with noise, in standard deviations of the noise."""
 
-CAPTURE_MEANINGS = ("not captured", "captured", "no orbit", "no gain")
-"""Meanings of the values of ``capture``. In lanes without orbit or gain the input is never used."""
-NOT_CAPTURED, CAPTURED, NO_ORBIT, NO_GAIN = range(len(CAPTURE_MEANINGS))
+CAPTURE_MEANINGS = ("not captured", "captured", "no orbit", "no gain", "off")
+"""Meanings of the values of ``capture``; in lanes with one of the last three no input is used."""
+NOT_CAPTURED, CAPTURED, NO_ORBIT, NO_GAIN, OFF = range(len(CAPTURE_MEANINGS))
 
 
 class ControlledMotion(NamedTuple):

@@ -1,0 +1,137 @@
+"""A page about a sweep with control: diagrams without and with control, and the effort below."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gearchaos.errors import FigureError
+from gearchaos.figures.diagrams import bifurcation
+from gearchaos.figures.labels import axis_label
+from gearchaos.figures.lanes import Between, diagram_lanes, swept_axes
+from gearchaos.figures.page import Page, letter, page, remark
+from gearchaos.figures.style import BLUE, LEGEND, SINGLE_COLUMN_MM, VERMILION
+from gearchaos.outputs.names import axis_name
+from gearchaos.records.control import CAPTURED
+from gearchaos.results.reading.result import Result
+
+LIMITS = tuple(axis_name(f"control.{name}") for name in ("limit", "limit_Nm"))
+"""Axes along which the value 0 is the machine without control."""
+
+LEAST_SHOWN = 1e-4
+"""Smallest effort that is shown, as a share of the largest one."""
+
+
+def control_sweep_page(
+    result: Result,
+    between: Between = (None, None),
+    width_mm: float = SINGLE_COLUMN_MM,
+    height_mm: float | None = None,
+) -> Page:
+    """Draw a sweep with control: the diagrams without and with it, and the effort of each lane.
+
+    Parameters
+    ----------
+    result : Result
+        A sweep with [control] over a parameter of the machine. If ``control.limit`` is swept as
+        well and one of its values is 0, the diagram of that value is the one without control.
+    between : (float or None, float or None)
+        Part of the parameter range to show; None is the end of the sweep.
+    width_mm, height_mm : float
+        Size of the page.
+
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot. Diagrams have lanes that are not captured in red.
+
+    Raises
+    ------
+    FigureError
+        If the result is none with control over one parameter of the machine.
+
+    Examples
+    --------
+    >>> page = figures.control_sweep_page(gearchaos.open_result("control.h5"))
+    """
+    free, held = _parts(result)
+    panels = [one for one in (free, held) if one is not None]
+    height = height_mm or 20.0 + 0.42 * width_mm * (len(panels) + 1)
+    with page(width_mm, height) as figure:
+        stack = figure.subplots(len(panels) + 1, 1, sharex=True)
+        for axes, part in zip(stack, panels, strict=False):
+            drawn = bifurcation(axes, part, between=between)
+            axes.set_xlabel("")
+            remark(axes, "without control" if part is free else _words(held))
+            if part is held:
+                _mark_others(axes, part, between)
+        if free is not None:
+            limits = np.array([axes.get_ylim() for axes in stack[:2]])
+            for axes in stack[:2]:
+                axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
+        draw_efforts(stack[-1], held, between)
+        stack[-1].set_xlim(drawn.lanes.limits)
+        letter(stack)
+        figure.align_ylabels(stack)
+    return figure
+
+
+def _parts(result: Result) -> tuple[Result | None, Result]:
+    """Return the parts of a result without and with control; the first may be missing."""
+    if "capture" not in result.variables:
+        raise FigureError("--control: is for results of sweeps with [control]; leave it out")
+    free = None
+    for axis in LIMITS:
+        if axis in result.axes:
+            values = result[axis]
+            if values[0] == 0.0:
+                free = result.sel(None, **{axis: 0.0})
+            result = result.sel(None, **{axis: float(values[-1])})
+    if len(swept_axes(result)) != 1 or swept_axes(result)[0].startswith("control_"):
+        raise FigureError(
+            "--control: draws a sweep over one parameter of the machine, beside the limit; choose "
+            "a value of the others with --at"
+        )
+    return free, result
+
+
+def _words(held: Result) -> str:
+    """Return what the diagram with control shows, in words."""
+    limit = held.fixed.get(LIMITS[0])
+    within = "" if limit is None else f", at most {100.0 * limit:g} % of the load"
+    return f"with control{within}"
+
+
+def _mark_others(axes: Axes, held: Result, between: Between) -> None:
+    """Mark the lanes that the controller does not keep on the orbit."""
+    lanes = diagram_lanes(held, between)
+    others = held.lanes("capture")[lanes.numbers] != CAPTURED
+    at = lanes.parameter[others]
+    if at.size:
+        axes.plot(
+            at,
+            np.full(at.size, 0.02),
+            "|",
+            color=VERMILION,
+            markersize=4,
+            transform=axes.get_xaxis_transform(),
+            label="not captured",
+        )
+        axes.legend(loc="lower right", **{**LEGEND, "frameon": True})
+
+
+def draw_efforts(axes: Axes, held: Result, between: Between) -> None:
+    """Draw the largest and the mean effort of every lane, in percent."""
+    lanes = diagram_lanes(held, between)
+    largest, mean = (
+        100.0 * held.lanes(name)[lanes.numbers] for name in ("effort_largest", "effort_mean")
+    )
+    look: dict[str, Any] = {"markersize": 1.8, "markeredgewidth": 0.0, "linestyle": "none", "marker": "o"}
+    axes.plot(lanes.parameter, largest, color=BLUE, label="largest", **look)
+    axes.plot(lanes.parameter, mean, color=VERMILION, label="mean since control began", **look)
+    axes.set_yscale("log")
+    top = max(float(np.nanmax(largest, initial=0.0)), 1e-12)
+    axes.set_ylim(top * LEAST_SHOWN, 3.0 * top)
+    axes.set_ylabel("change of the load (%)")
+    axes.set_xlabel(axis_label(held, swept_axes(held)[0]))
+    axes.legend(loc="lower right", ncols=2, **{**LEGEND, "frameon": True})
