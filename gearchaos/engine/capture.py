@@ -38,8 +38,10 @@ def control_arrays(
         repeats,
         1 - points,
     )
-    reach = reach_of(controllers.noise_of(lanes, values))
-    held = (distance[:, -HELD * repeats :] <= reach[:, np.newaxis]).all(axis=1)
+    noise, last = controllers.noise_of(lanes, values), slice(-HELD * repeats, None)
+    held = (distance[:, last] <= reach_of(noise)[:, np.newaxis]).all(axis=1)
+    # With noise the motion may be near the orbit by chance; without, an input may be exactly 0.
+    held &= (noise == 0.0) | (outcome.inputs[:, last] != 0.0).all(axis=1)
     state[(state == NOT_CAPTURED) & held] = CAPTURED
     share = np.abs(outcome.inputs) / np.abs(system.steady_input)[:, np.newaxis]
     share[outcome.status != kernels.Status.OK] = np.nan
