@@ -91,16 +91,27 @@ class Control(Table, Generic[State]):
     """weight of the squared deviation in the cost of a linear-quadratic gain"""
     input_weight: float = key("weight of the squared input in the cost", "1", default=10.0, gt=0)
     gain_factor: float = key("factor of the gain", "1", default=1.0)
-    limit: float | None = key(units="1", example=0.1, default=None, ge=0)
-    """largest change of the input, as a share of the steady input; 0 switches the controller off"""
-    limit_Nm: float | None = key("the same for a load", "N m", example=5.0, default=None, ge=0)
+    limit: float | None = key(
+        "largest change of the input, as a share of it",
+        units="1",
+        example=0.1,
+        default=None,
+        ge=0,
+    )
+    limit_Nm: float | None = key(
+        "largest change of the torque", "N m", example=5.0, default=None, ge=0
+    )
     measured: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
         "states that are measured, the others are estimated; by default all are known",
         example=["delta_5", "delta_5_rate"],
         default=(),
     )
-    noise: float = key(units="1", default=0.0, ge=0)
-    """standard deviation of the noise of what is measured, in the scales of the states"""
+    noise: float = key(
+        "standard deviation of the measurement noise, as a share of the largest value of a state",
+        units="1",
+        default=0.0,
+        ge=0,
+    )
     seed: int = key("seed of the noise", default=0, ge=0, le=2**32 - 1)
     begins: int = key(default=0, ge=0, le=1_000_000_000)
     """mesh period in which the controller is switched on, the transient included"""

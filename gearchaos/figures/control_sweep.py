@@ -109,7 +109,7 @@ def _captured_page(result: Result, width_mm: float, height_mm: float | None) -> 
         axes.set_xlabel(axis_label(result, x, line_length=44))
         axes.set_ylabel(axis_label(result, y, line_length=44))
         axes.tick_params(which="both", length=0)
-        figure.colorbar(mesh, ax=axes, label="captured starts (%)")
+        figure.colorbar(mesh, ax=axes, label="Captured starts (%)")
         remark(axes, f"{starts.shape[2]} starts each")
     return figure
 
