@@ -223,7 +223,7 @@ def _measured_states_exist(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("control", "integration", "outputs")
 def _controllers_go_with_the_rest(config: Tables) -> Iterator[Fault]:
-    """What cannot be computed with a controller is refused."""
+    """Errors, plain steps and some exponents cannot be computed with a controller."""
     control = config.control
     if control is None:
         return

@@ -82,7 +82,7 @@ class Target(NamedTuple):
 
     @classmethod
     def idle(cls, periods: int, states: int) -> "Target":
-        """Return what stands in where there is no orbit of this number of mesh periods."""
+        """Return a target of zeros, for lanes without an orbit of this number of mesh periods."""
         nothing = np.zeros((periods, states))
         maps = PeriodMaps(nothing, np.zeros((periods, states, states)), nothing)
         return cls(maps, np.ones(states))
