@@ -27,6 +27,48 @@ from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
 from gearchaos_kernels.methods.protocol import begin_lane
 from gearchaos_kernels.plan import Floats
 
+CENTRE = (
+    2509.0809287301226727,
+    33430.575583588128105,
+    67265.770927008700853,
+    45921.953931549871457,
+    13731.693765509461125,
+    1971.5909503065514427,
+    133.14166789178437745,
+    3.387132872796366608,
+)
+CENTRE_BELOW = (
+    5226.495278852545925,
+    28729.085735721942674,
+    39307.89580009271061,
+    21213.794301586595867,
+    5394.1960214247511077,
+    687.1870074920579083,
+    42.313330701600911252,
+    1.0,
+)
+TAIL = (
+    7.7454501427834140764e-4,
+    0.0227238449892691845833,
+    0.24178072517745061177,
+    1.27045825245236838258,
+    3.64784832476320460504,
+    5.7694972214606914055,
+    4.6303378461565452959,
+    1.42343711074968357734,
+)
+TAIL_BELOW = (
+    1.05075007164441684324e-9,
+    5.475938084995344946e-4,
+    0.0151986665636164571966,
+    0.14810397642748007459,
+    0.68976733498510000455,
+    1.6763848301838038494,
+    2.05319162663775882187,
+    1.0,
+)
+"""Coefficients of `quantile` in the middle and in the tails, above and below the bar."""
+
 
 @dataclass(frozen=True)
 class Feedback:
@@ -323,14 +365,14 @@ def measure(memory, slot, index, phase, control, scale, scene):
             if noise > 0.0:
                 value += noise * gaussian(control.seeds[index], phase * states + state)
             memory[(known + state) * STRIDE + slot] = value
-            varied = 0.0
             if scene.tangent is not None:
                 varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-            memory[(known_varied + state) * STRIDE + slot] = varied
+                memory[(known_varied + state) * STRIDE + slot] = varied
         else:
             memory[(known + state) * STRIDE + slot] = memory[(kept + state) * STRIDE + slot]
-            varied = memory[(kept_varied + state) * STRIDE + slot]
-            memory[(known_varied + state) * STRIDE + slot] = varied
+            if scene.tangent is not None:
+                varied = memory[(kept_varied + state) * STRIDE + slot]
+                memory[(known_varied + state) * STRIDE + slot] = varied
     if scene.feedback.estimated is not None:
         place = nearest_point(memory, slot, phase, control, index, scale, scene)
         signals = control.measured.shape[0]
@@ -341,14 +383,15 @@ def measure(memory, slot, index, phase, control, scale, scene):
                 control.seeds[index], phase * signals + signal
             )
             error = value - memory[(kept + state) * STRIDE + slot]
-            varied = 0.0
-            if scene.tangent is not None:
-                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-                varied -= memory[(kept_varied + state) * STRIDE + slot]
             for row in range(states):
                 factor = control.correction[index, place, row, signal]
                 memory[(known + row) * STRIDE + slot] += factor * error
-                memory[(known_varied + row) * STRIDE + slot] += factor * varied
+            if scene.tangent is not None:
+                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
+                varied -= memory[(kept_varied + state) * STRIDE + slot]
+                for row in range(states):
+                    factor = control.correction[index, place, row, signal]
+                    memory[(known_varied + row) * STRIDE + slot] += factor * varied
 
 
 @scalar
@@ -360,6 +403,8 @@ def nearest_point(memory, slot, phase, control, index, scale, scene):
     points, repeats = control.points.shape[1], control.about[3]
     known = control_rows(scene).known
     nearest = phase % repeats
+    if points == repeats:
+        return nearest
     least = math.inf
     for point in range(phase % repeats, points, repeats):
         distance = 0.0
@@ -402,21 +447,25 @@ def predict(memory, slot, index, nearest, chosen, control, scale, scene):
             row = earlier * states + state
             source = at.known + state if earlier == 0 else at.kept + row - states
             memory[(at.kept + row) * STRIDE + slot] = memory[source * STRIDE + slot]
-            source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
-            memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+            if scene.tangent is not None:
+                source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
+                memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
     if scene.feedback.estimated is not None:
         following = (nearest + 1) % control.points.shape[1]
         for row in range(states):
             value = control.points[index, following, row]
             value += control.response[index, nearest, row] * effort
-            change = control.response[index, nearest, row] * varied
             for state in range(states):
                 factor = control.transition[index, nearest, row, state]
                 deviation = memory[(at.known + state) * STRIDE + slot]
                 value += factor * (deviation - control.points[index, nearest, state])
-                change += factor * memory[(at.known_varied + state) * STRIDE + slot]
             memory[(at.kept + row) * STRIDE + slot] = value
-            memory[(at.kept_varied + row) * STRIDE + slot] = change
+            if scene.tangent is not None:
+                change = control.response[index, nearest, row] * varied
+                for state in range(states):
+                    factor = control.transition[index, nearest, row, state]
+                    change += factor * memory[(at.known_varied + state) * STRIDE + slot]
+                memory[(at.kept_varied + row) * STRIDE + slot] = change
 
 
 @scalar
@@ -432,11 +481,9 @@ def scale_variations(memory, slot, length, scene):
 def gaussian(seed, number):
     """Return a normally distributed number that depends on a seed and a counter only.
 
-    Two outputs of SplitMix64 (Steele, Lea, Flood 2014) make one number (Box and Muller 1958).
+    The quantile of a uniform number, which is an output of SplitMix64 (Steele, Lea, Flood 2014).
     """
-    first = uniform(mixed(seed + np.uint64(2 * number + 1) * np.uint64(0x9E3779B97F4A7C15)))
-    second = uniform(mixed(seed + np.uint64(2 * number + 2) * np.uint64(0x9E3779B97F4A7C15)))
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    return quantile(uniform(mixed(seed + np.uint64(number + 1) * np.uint64(0x9E3779B97F4A7C15))))
 
 
 @scalar
@@ -449,5 +496,29 @@ def mixed(number):
 
 @scalar
 def uniform(number):
-    """Return a number above 0 and at most 1 from 64 bits."""
-    return (float(number >> np.uint64(11)) + 1.0) * 2.0**-53
+    """Return a number between 0 and 1, without both, from 64 bits."""
+    return (float(number >> np.uint64(12)) + 0.5) * 2.0**-52
+
+
+@scalar
+def quantile(share):
+    """Return the value that a normally distributed number is below with a probability.
+
+    Algorithm AS 241 of Wichura (1988), PPND16. Sizes above 6.7, one in 4e10, are cut to it.
+    """
+    middle = share - 0.5
+    if abs(middle) <= 0.425:
+        r = 0.180625 - middle * middle
+        return middle * horner(r, CENTRE) / horner(r, CENTRE_BELOW)
+    r = min(math.sqrt(-math.log(min(share, 1.0 - share))), 5.0) - 1.6
+    size = horner(r, TAIL) / horner(r, TAIL_BELOW)
+    return size if middle > 0.0 else -size
+
+
+@scalar
+def horner(x, coefficients):
+    """Return a polynomial whose coefficients begin with that of the highest power."""
+    total = 0.0
+    for coefficient in coefficients:
+        total = total * x + coefficient
+    return total

@@ -1,10 +1,9 @@
 """Control of an input: against NumPy, its tangent vector, its noise, and determinism."""
 
-import math
-
 import numpy as np
 import pytest
 from gearchaos_kernels import Control, Plan, integrate
+from scipy.special import ndtri
 
 from .oscillator import Oscillators
 
@@ -22,12 +21,9 @@ def split_mix(number: int) -> int:
 
 
 def gaussian(seed: int, number: int) -> float:
-    """Return a normally distributed number (Box and Muller 1958)."""
-    first, second = (
-        (float(split_mix((seed + (2 * number + n) * GOLDEN) % WHOLE) >> 11) + 1.0) * 2.0**-53
-        for n in (1, 2)
-    )
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    """Return a normally distributed number, the quantile of a uniform one."""
+    share = (float(split_mix((seed + (number + 1) * GOLDEN) % WHOLE) >> 12) + 0.5) * 2.0**-52
+    return float(ndtri(share))
 
 
 def oscillators(lanes: int) -> Oscillators:
