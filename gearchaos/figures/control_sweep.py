@@ -58,7 +58,9 @@ def control_sweep_page(
 
     Examples
     --------
-    >>> page = figures.control_sweep_page(gearchaos.open_result("control.h5"))
+    ::
+
+        page = figures.control_sweep_page(gearchaos.open_result("control.h5"))
     """
     if len(_of_controllers(result)) == 2:
         return _captured_page(result, width_mm, height_mm)
