@@ -27,7 +27,8 @@ from typing import Any
 # kernels, and a command that only prints its help imports nothing.
 _HOMES = {
     "models": ("Configuration", "load_config"),
-    "controlling.controller": ("Controller", "ControlSettings"),
+    "controlling.controller": ("Controller",),
+    "dynamics.controllers": ("ControlSettings",),
     "engine.response": ("respond",),
     "engine.running": ("run",),
     "errors": ("ConfigurationError", "FigureError", "FileError", "GearchaosError"),

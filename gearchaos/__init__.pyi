@@ -1,7 +1,7 @@
 # What type checkers and editors see of the names that are imported on first use.
 from gearchaos import iso1328 as iso1328
 from gearchaos.controlling.controller import Controller as Controller
-from gearchaos.controlling.controller import ControlSettings as ControlSettings
+from gearchaos.dynamics.controllers import ControlSettings as ControlSettings
 from gearchaos.engine.response import respond as respond
 from gearchaos.engine.running import run as run
 from gearchaos.errors import ConfigurationError as ConfigurationError

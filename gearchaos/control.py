@@ -96,7 +96,8 @@ def _control(options: ControlOptions) -> None:
 
 def _controller(options: ControlOptions) -> "Controller":
     """Return the controller that the options describe."""
-    from gearchaos.controlling.controller import Controller, ControlSettings
+    from gearchaos.controlling.controller import Controller
+    from gearchaos.dynamics.controllers import ControlSettings
     from gearchaos.models import load_config
     from gearchaos.system import System
 

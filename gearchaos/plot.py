@@ -116,6 +116,12 @@ class PlotOptions(NamedTuple):
             "draw the share of gear pairs and starts that settles on each motion, at each value"
         ),
     ] = False
+    control: Annotated[
+        bool,
+        Option(
+            "draw a sweep with [control]: the diagrams without and with it, and the effort below"
+        ),
+    ] = False
     branches: Annotated[
         Path | None,
         Option(
@@ -173,7 +179,7 @@ def _plot(options: PlotOptions) -> None:
     if any(map(is_branch_file, options.results)):
         _plot_branches(options)
         return
-    results = [_opened(path, options.at) for path in options.results]
+    results = [_opened(path, options.at, options.control) for path in options.results]
     responses = [is_response(one) for one in results]
     pairs = zip(results, responses, strict=True)
     results = [in_units(one, options.units, over_time) for one, over_time in pairs]
@@ -181,6 +187,7 @@ def _plot(options: PlotOptions) -> None:
         flags = {
             "--stages": options.stages,
             "--shares": options.shares,
+            "--control": options.control,
             "--mark": options.mark,
             "--branches": options.branches,
             "--boundaries": options.boundaries,
@@ -377,7 +384,7 @@ def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
 
 def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sheet]":
     """Return the page of one or several sweeps."""
-    from gearchaos.figures import bifurcation_page, map_page, shares_page
+    from gearchaos.figures import bifurcation_page, control_sweep_page, map_page, shares_page
     from gearchaos.figures.labels import in_words
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.figures.style import SINGLE_COLUMN_MM
@@ -386,15 +393,20 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     marked = _marked(options, swept_axes(results[0]))
     width, height = options.width or SINGLE_COLUMN_MM, options.height
     between = (options.low, options.high)
-    if options.shares:
+    for chosen, kind, draw_page in (
+        (options.shares, "shares", shares_page),
+        (options.control, "control", control_sweep_page),
+    ):
+        if not chosen:
+            continue
         flags: dict[str, object] = {
             "--variable": options.variable,
             "--stages": options.stages,
             "--branches": options.branches,
             "--boundaries": options.boundaries,
         }
-        _draws_alone("a figure of shares", options, flags)
-        return [(f"{name}_shares", partial(shares_page, results[0], between, width, height))]
+        _draws_alone(f"a figure of {kind}", options, flags)
+        return [(f"{name}_{kind}", partial(draw_page, results[0], between, width, height))]
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
@@ -467,8 +479,8 @@ def _response_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list
     ]
 
 
-def _opened(path: Path, at: Sequence[Place]) -> "Result":
-    """Read a result at the places that --at names; of a map, leave out the sections."""
+def _opened(path: Path, at: Sequence[Place], whole: bool = False) -> "Result":
+    """Read a result at the places that --at names; of a map, unless whole, without sections."""
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.results.reading.result import open_result
 
@@ -482,7 +494,7 @@ def _opened(path: Path, at: Sequence[Place]) -> "Result":
                 f"{result.axis} with --from and --to"
             )
         result = result.sel(method="within", **fixed)
-        if len(left) > 1:
+        if len(left) > 1 and not whole:
             break
     return result
 

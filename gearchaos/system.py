@@ -23,6 +23,7 @@ from gearchaos.arguments import (
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import along_the_way
+from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
 from gearchaos.dynamics.embedded import CLOSE_RETURN_RECORD, embedded_orbits
 from gearchaos.dynamics.exponents import (
@@ -36,7 +37,7 @@ from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
-from gearchaos.engine.branching import BranchRange, arrays_of_branch
+from gearchaos.engine.branching import arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.method_choice import with_method
@@ -110,7 +111,7 @@ class System:
     ) -> None:
         config = configuration_of(config)
         values = coordinates("at", at or {}) | coordinates("groups", groups)
-        self.config, _ = with_method(config.at(values))
+        self.config, _ = with_method(config.without_control().at(values))
         for sweep in self.config.sweeps.values():
             if swept_values(sweep).size > 1:
                 raise ConfigurationError(

@@ -13,7 +13,7 @@ from gearchaos.configuration.messages import Fault, fault_texts, faults_of
 from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.plausible import implausible
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
-from gearchaos.configuration.tables import Tables
+from gearchaos.configuration.tables import OF_CONTROLLERS, Tables, of_the_machine
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     text_of_file,
@@ -309,6 +309,42 @@ class Configuration(Tables):
             swept = self.sweep.parameter
             left = [{"parameter": swept, "values": [float(values[swept])]}]
         tables |= dict(zip(self.sweeps, left, strict=False))
+        if not OF_CONTROLLERS.keys() >= values.keys():
+            # The orbit of a controller is then found at the fixed value.
+            tables.get("control", {}).pop("found_at", None)
+        return type(self).from_tables(tables, self.source, self._folder)
+
+    def without_control(self) -> Self:
+        """Return a copy without a controller and without sweeps of its keys.
+
+        Returns
+        -------
+        Configuration
+            A copy; the same configuration if it has no controller.
+
+        Raises
+        ------
+        ConfigurationError
+            If keys of the controller alone are swept.
+
+        Examples
+        --------
+        >>> config.without_control() == config
+        True
+        """
+        if self.control is None:
+            return self
+        left = of_the_machine(self)
+        if not left:
+            raise ConfigurationError(
+                f"{self.source}: only keys of [control] are swept; sweep a parameter of the "
+                "machine, such as one value of it, to leave out the controller"
+            )
+        tables = self.tables()
+        kept = [tables.pop(name) for name in self.sweeps if name in left]
+        tables = {name: table for name, table in tables.items() if name not in self.sweeps}
+        del tables["control"]
+        tables |= dict(zip(self.sweeps, kept, strict=False))
         return type(self).from_tables(tables, self.source, self._folder)
 
     def resolved_toml(self) -> str:

@@ -8,7 +8,7 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.configuration.run_tables import MOST_RUN_LANES, Start
-from gearchaos.configuration.tables import Tables
+from gearchaos.configuration.tables import OF_CONTROLLERS, Tables, of_the_machine, swept_values
 
 Rule: TypeAlias = Callable[[Any], Iterator[Fault]]
 
@@ -168,3 +168,101 @@ def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
         product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
         rule = f"{product} make {lanes} lanes, must be at most {MOST_RUN_LANES}"
         yield Fault(list(config.sweeps)[-1], rule, "lower a count, or split it into several runs")
+
+
+@GENERIC_RULES.reads("control")
+def _a_swept_controller_exists(config: Tables) -> Iterator[Fault]:
+    """A key of [control] is swept only with a controller that depends on it."""
+    control = config.control
+    for table, sweep in config.sweeps.items():
+        if sweep.parameter not in OF_CONTROLLERS:
+            continue
+        name = sweep.parameter.rpartition(".")[2]
+        if control is None:
+            rule, remedy = "belongs to a table that is missing", "add [control]"
+            yield Fault(f"{table}.parameter", rule, remedy, sweep.parameter)
+        elif control.gain == "placement" and name.endswith("_weight"):
+            rule = 'has no meaning with control.gain = "placement"'
+            yield Fault(f"{table}.parameter", rule, 'set gain = "lqr"', sweep.parameter)
+
+
+@GENERIC_RULES.reads("control")
+def _the_input_can_be_changed(config: Tables) -> Iterator[Fault]:
+    """A controller changes an input that the model has, by a limit in one unit."""
+    control = config.control
+    if control is None:
+        return
+    known = " or ".join(f'"{name}"' for name in config.actuators)
+    if not config.actuators:
+        yield Fault(
+            "control", "this kind of machine has no input for a controller yet", "leave it out"
+        )
+    elif control.actuator not in config.actuators:
+        rule = f"a controller can change {known} only"
+        if control.actuator == "speed":
+            rule += "; another speed would change the length of the mesh period itself"
+        yield Fault("control.actuator", rule, f"set actuator = {known}", control.actuator)
+    given = [
+        name
+        for name in ("limit", "limit_Nm")
+        if getattr(control, name) is not None or f"control.{name}" in config.swept
+    ]
+    if len(given) != 1:
+        rule = "is given in two units" if given else "is missing"
+        yield Fault("control.limit", rule, "give limit, a share, or limit_Nm, or sweep one of them")
+
+
+@GENERIC_RULES.reads("control", "scene")
+def _measured_states_exist(config: Tables) -> Iterator[Fault]:
+    """Measured states are states of the scene."""
+    for name in config.control.measured if config.control else ():
+        if name not in config.states:
+            remedy = f"states: {', '.join(config.states)}"
+            yield Fault("control.measured", "is no state of this scene", remedy, name)
+
+
+@GENERIC_RULES.reads("control", "integration", "outputs")
+def _controllers_go_with_the_rest(config: Tables) -> Iterator[Fault]:
+    """Errors, plain steps and some exponents cannot be computed with a controller."""
+    control = config.control
+    if control is None:
+        return
+    if share := config.integration.error_check:
+        rule = "cannot be combined with [control], which is designed for one number of steps"
+        remedy = "leave it out; the same sweep without [control] shows the errors"
+        yield Fault("integration.error_check", rule, remedy, share)
+    if config.integration.crossings == "plain":
+        rule = "cannot be combined with [control], whose orbits need resolved crossings"
+        yield Fault("integration.crossings", rule, 'set crossings = "resolved"', "plain")
+    if config.outputs.exponents and (control.measured or control.gain == "delayed"):
+        rule = "cannot be computed with an estimate or a delay, which have states of their own"
+        yield Fault("outputs.exponents", rule, "set outputs.exponents = false", True)
+
+
+@GENERIC_RULES.reads("control")
+def _the_orbit_can_be_followed(config: Tables) -> Iterator[Fault]:
+    """The orbit of a controller is followed along at most one parameter of the machine."""
+    control, sweeps = config.control, of_the_machine(config)
+    if control is None:
+        return
+    if len(sweeps) > 1:
+        rule = "is a second parameter of the machine, and an orbit is followed along one of them"
+        remedy = f"sweep a key of [control] instead, such as {next(iter(OF_CONTROLLERS))}"
+        yield Fault("second_sweep.parameter", rule, remedy, config.sweeps["second_sweep"].parameter)
+    if config.realisations.size > 1:
+        rule = f"cannot be combined with several {config.realisation_words}"
+        yield Fault("control", rule, "compute one of them, or leave out [control]")
+    at = control.found_at
+    for table, sweep in sweeps.items():
+        if sweep.parameter not in config.parameters:
+            continue
+        if sweep.parameter in config.discrete_parameters and sweep.size > 1:
+            rule = "has no values between two of its own, along which an orbit could be followed"
+            yield Fault(f"{table}.parameter", rule, "sweep another one", sweep.parameter)
+        low, high = swept_values(sweep)[[0, -1]].tolist()
+        if at is not None and not low <= at <= high:
+            rule = f"must be between {low:g} and {high:g}, the swept values of {sweep.parameter}"
+            yield Fault("control.found_at", rule, "choose a value of the sweep", at)
+    if at is not None and not sweeps:
+        rule = "has no meaning, because no parameter of the machine is swept"
+        yield Fault("control.found_at", rule, "leave it out", at)

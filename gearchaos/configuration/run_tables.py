@@ -1,4 +1,7 @@
-"""The tables of a run, for any model: scene, start, sweeps, method, outputs."""
+"""The tables of a run, for any model: scene, start, control, sweeps, method, outputs."""
+
+# The unit at the end of a key keeps its capital letter.
+# ruff: noqa: N815
 
 import math
 from fractions import Fraction
@@ -69,6 +72,49 @@ class Start(Table, Generic[State]):
         """Number of starts per parameter value."""
         starts: int = self.count ** (len(self.box) if self.kind == "grid" else 1)
         return starts
+
+
+class Control(Table, Generic[State]):
+    """A controller that keeps every lane on a periodic orbit by small changes of an input."""
+
+    period: int = key("period of the target orbit in excitation periods", default=1, ge=1, le=64)
+    number: int = key(default=0, ge=0)
+    """which orbit of this period, in the order of their largest multipliers, the smallest first"""
+    found_at: float | None = key(example=12.47, default=None)
+    """value of the swept parameter at which the motion is searched for the orbit, by default the
+    one in the middle; from there the orbit is followed to all other values"""
+    actuator: str = key("the input that the controller changes", default="load")
+    gain: Literal["lqr", "placement", "delayed"] = key(default="lqr")
+    """linear-quadratic gain; placement of the unstable multipliers at 0; or the linear-quadratic
+    gain times the difference from the state one orbit earlier"""
+    state_weight: float = key(units="1", default=1.0, ge=0)
+    """weight of the squared deviation in the cost of a linear-quadratic gain"""
+    input_weight: float = key("weight of the squared input in the cost", "1", default=10.0, gt=0)
+    gain_factor: float = key("factor of the gain", "1", default=1.0)
+    limit: float | None = key(
+        "largest change of the input, as a share of it",
+        units="1",
+        example=0.1,
+        default=None,
+        ge=0,
+    )
+    limit_Nm: float | None = key(
+        "largest change of the torque", "N m", example=5.0, default=None, ge=0
+    )
+    measured: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
+        "states that are measured, the others are estimated; by default all are known",
+        example=["delta_5", "delta_5_rate"],
+        default=(),
+    )
+    noise: float = key(
+        "standard deviation of the measurement noise, as a share of the largest value of a state",
+        units="1",
+        default=0.0,
+        ge=0,
+    )
+    seed: int = key("seed of the noise", default=0, ge=0, le=2**32 - 1)
+    begins: int = key(default=0, ge=0, le=1_000_000_000)
+    """mesh period in which the controller is switched on, the transient included"""
 
 
 class Sweep(Table):

@@ -8,10 +8,17 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gearchaos.arrays import Floats, Integers
-from gearchaos.configuration.keys import AS_LIST, Key, Table, key
+from gearchaos.configuration.keys import AS_LIST, Key, Table, key, keys_of
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.ranges import Range
-from gearchaos.configuration.run_tables import Integration, Outputs, Scene, Start, Sweep
+from gearchaos.configuration.run_tables import (
+    Control,
+    Integration,
+    Outputs,
+    Scene,
+    Start,
+    Sweep,
+)
 
 
 @dataclass(frozen=True)
@@ -59,12 +66,15 @@ class Tables(Titled):
         Parameters without values between two of their values.
     tables_of_lanes : frozenset of str
         Tables that must be free of faults before `lane_faults` is called.
+    actuators : tuple of str
+        Inputs that a controller can change.
     """
 
     parameters: ClassVar[Mapping[str, Parameter]] = MappingProxyType({})
     realisation_words: ClassVar[str] = "realisations"
     discrete_parameters: ClassVar[frozenset[str]] = frozenset()
     tables_of_lanes: ClassVar[frozenset[str]] = frozenset({"sweep", "second_sweep", "scene"})
+    actuators: ClassVar[tuple[str, ...]] = ()
 
     scene: Scene = key("which effects exist", default=Scene())
     start: Start[str] = key("the state in which the lanes start", default=Start())
@@ -73,6 +83,7 @@ class Tables(Titled):
     """a second swept parameter: every value of it with every one of [sweep]"""
     integration: Integration = key("the fixed grid of the integration", default=Integration())
     outputs: Outputs[str] = key("the kept outputs of every lane", default=Outputs())
+    control: Control[str] | None = key("a controller of every lane", default=None)
     files: dict[str, str] | None = key(default=None)
     """files that are named above, word for word, as a result keeps them"""
 
@@ -149,3 +160,23 @@ def axis_values(config: Tables) -> dict[str, Floats]:
     Each array has the shape (values,) and the unit of its parameter.
     """
     return {one.parameter: swept_values(one) for one in reversed(config.sweeps.values())}
+
+
+OF_CONTROLLERS = MappingProxyType(
+    {
+        path: Parameter(path, path, one.valid, one.units or "1", one.wording)
+        for one in keys_of(Control)
+        for path in [f"control.{one.path}"]
+        if one.is_number and one.path != "found_at"
+    }
+)
+"""Keys of [control] that a sweep may vary, by path; the machine does not depend on them."""
+
+
+def of_the_machine(config: Tables) -> dict[str, Sweep]:
+    """Return the sweeps of parameters of the machine, not of a controller, by their table."""
+    return {
+        table: sweep
+        for table, sweep in config.sweeps.items()
+        if sweep.parameter not in OF_CONTROLLERS
+    }

@@ -6,79 +6,27 @@
 >>> controller.run(starts=100, periods=500).captured.mean()
 """
 
-from typing import NamedTuple
-
 import gearchaos_kernels as kernels
 import numpy as np
 from gearchaos_kernels import Control, Outcome, Plan
 
 from gearchaos.arguments import finite_number, instance, one_of, whole_number
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.control import (
-    controllability,
-    estimate_correction,
-    lqr_gain,
-    period_maps,
-    placed_gain,
-    require_controllable,
-    sorted_multipliers,
-)
+from gearchaos.dynamics.control import controllability, require_controllable, sorted_multipliers
+from gearchaos.dynamics.controllers import ControlSettings, Designed, Target, control_of
 from gearchaos.dynamics.following import Orbit
 from gearchaos.errors import ConfigurationError
-from gearchaos.records.control import ControlledMotion
-from gearchaos.records.period import coordinate_scale
+from gearchaos.records.control import ControlledMotion, distance_from, reach_of
 from gearchaos.system import System
 
 METHODS = ("lqr", "placement", "delayed")
 """How the gain is found; see `ControlSettings`."""
-
-CAPTURED = 1e-6
-"""Largest distance of a captured motion without noise, as a share of the largest state."""
-
-NOISE_REACH = 30.0
-"""Largest distance of a captured motion with noise, in standard deviations of the noise."""
-
-QUIET = 1e-6
-"""Noise that an estimate assumes where none is given, in the scales of the states."""
 
 SPREAD = 1e-3
 """Largest difference between the states from which starts are computed."""
 
 LEAST_TRANSIENT = 300
 """Smallest number of mesh periods over which chaos separates them."""
-
-
-class ControlSettings(NamedTuple):
-    """How a controller is designed.
-
-    Attributes
-    ----------
-    method : {"lqr", "placement", "delayed"}
-        A linear-quadratic gain; a gain that moves all unstable multipliers to 0; or delayed
-        feedback, which multiplies the same linear-quadratic gain with the difference from the
-        state one orbit earlier.
-    state_weight, input_weight : float
-        Weights of the squared deviation and of the squared input in the cost, dimensionless.
-    limit : float
-        Largest input as a share of the load. Where more is needed, the input is 0.
-    measured : tuple of str
-        Names of the states that are measured; the others are estimated. By default all are known.
-    noise : float
-        Standard deviation of the measurement noise, in the scales of the states.
-    begins : int
-        Mesh period in which control begins.
-    seed : int
-        Seed of the noise.
-    """
-
-    method: str = "lqr"
-    state_weight: float = 1.0
-    input_weight: float = 10.0
-    limit: float = 0.1
-    measured: tuple[str, ...] = ()
-    noise: float = 0.0
-    begins: int = 0
-    seed: int = 0
 
 
 class Controller:
@@ -129,20 +77,12 @@ class Controller:
         instance("orbit", orbit, Orbit, "System.orbit finds one")
         self.system, self.orbit = system, orbit
         self.settings = _checked(settings or ControlSettings(), system.states)
-        lane, plan = system.equations, system.plan
-        whole = orbit.period * lane.repeats_after
-        once = Plan(plan.steps_per_period, 0, whole, whole, method=plan.method)
-        section = kernels.integrate(lane, orbit.point[np.newaxis], once).section[0]
-        points = np.vstack([orbit.point, section[:-1]])
-        self.scales: Floats = coordinate_scale(points[np.newaxis])[0]
-        self.maps = period_maps(lane, points, plan)
+        target = Target.at(system.equations, orbit.point, orbit.period, system.plan)
+        self.maps, self.scales = target.maps, target.scales
         require_controllable(self.maps, system.config.source)
         self.multipliers, self.shares = controllability(self.maps)
-        given = self.settings
-        if given.method == "placement":
-            self.gain = placed_gain(self.maps)
-        else:
-            self.gain = lqr_gain(self.maps, given.state_weight, given.input_weight)
+        self.gain = target.gain(self.settings)
+        self._control = control_of([Designed(target, self.gain, self.settings)], system.equations)
         self.closed_multipliers: Complex = sorted_multipliers(self.maps.closed(self.gain))
 
     @property
@@ -169,34 +109,10 @@ class Controller:
         (3, 2, 6)
         """
         lanes = whole_number("lanes", lanes, least=1)
-        given, periods = self.settings, len(self.gain)
-        control = Control.of_states(
-            np.tile(self.maps.points, (lanes, 1, 1)),
-            np.tile(self.gain, (lanes, 1, 1)),
-            np.full(lanes, given.limit * abs(self.load)),
-            self.system.repeats_after,
-        )
-        names = self.system.states
-        measured = [names.index(name) for name in given.measured or names]
-        noise = given.noise * self.scales[measured]
         seeds = np.empty(lanes, dtype=np.uint64)
-        seeds[:] = np.random.SeedSequence(given.seed).generate_state(lanes, np.uint64)
-        control = control._replace(
-            scales=np.tile(self.scales, (lanes, 1)),
-            begins=given.begins,
-            measured=np.array(measured),
-            noise=np.tile(noise, (lanes, 1)),
-            seeds=seeds,
-            delay=periods if given.method == "delayed" else 0,
-        )
-        if not given.measured:
-            return control
-        assumed = max(given.noise, QUIET) * self.scales
-        correction = estimate_correction(self.maps, measured, assumed[measured], assumed)
-        return control._replace(
-            transition=np.tile(self.maps.jacobians, (lanes, 1, 1, 1)),
-            response=np.tile(self.maps.responses, (lanes, 1, 1)),
-            correction=np.tile(correction, (lanes, 1, 1, 1)),
+        seeds[:] = np.random.SeedSequence(self.settings.seed).generate_state(lanes, np.uint64)
+        return self._control.of(np.zeros(lanes, dtype=np.intp))._replace(
+            limit=np.full(lanes, self.settings.limit * abs(self.load)), seeds=seeds
         )
 
     def starts(self, count: int) -> Floats:
@@ -255,10 +171,11 @@ class Controller:
         outcome = self.integrate(
             states, Plan(plan.steps_per_period, 0, periods, periods, method=plan.method)
         )
-        reach = max(CAPTURED, NOISE_REACH * self.settings.noise)
-        return ControlledMotion(
-            outcome.section, outcome.inputs, self._distance(outcome.section), reach
+        distance = distance_from(
+            self.maps.points, outcome.section, self.scales.max(), self.system.repeats_after, 1
         )
+        reach = float(reach_of(self.settings.noise))
+        return ControlledMotion(outcome.section, outcome.inputs, distance, reach)
 
     def integrate(self, states: Floats, plan: Plan) -> Outcome:
         """Integrate motions with control as a plan of the kernels says.
@@ -285,18 +202,7 @@ class Controller:
         """
         lanes = len(states)
         system = self.system.equations.of(np.zeros(lanes, dtype=np.intp))
-        return kernels.integrate(system, states, plan, control=self.control(lanes))
-
-    def _distance(self, section: Floats) -> Floats:
-        """Return the distance of section points (lanes, periods, states) from the orbit."""
-        repeats, points = self.system.repeats_after, self.maps.points
-        distance = np.full(section.shape[:2], np.inf)
-        for number, point in enumerate(points):
-            # After mesh period n the excitation has the phase of point n + 1.
-            first = (number - 1) % repeats
-            there = np.max(np.abs(section[:, first::repeats] - point), axis=2) / self.scales.max()
-            distance[:, first::repeats] = np.fmin(distance[:, first::repeats], there)
-        return distance
+        return kernels.integrate(system.controlled(self.control(lanes)), states, plan)
 
 
 def _checked(given: ControlSettings, states: tuple[str, ...]) -> ControlSettings:

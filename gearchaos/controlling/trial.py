@@ -110,7 +110,7 @@ def _measures(controller: Controller, states: Floats, *, controlled: bool) -> di
     )
     system = controller.system.equations.of(np.zeros(len(states), dtype=np.intp))
     control = controller.control(len(states)) if controlled else None
-    outcome = kernels.integrate(system, states, plan, control=control)
+    outcome = kernels.integrate(system.controlled(control), states, plan)
     found: dict[str, Any] = dict(run.lanes.model.loads(outcome.loads, system))
     for number, element in enumerate(run.elements if plan.contact else ()):
         summary = contact_summary(outcome.contact[:, number], periods)

@@ -110,11 +110,10 @@ def _tangent_ends(system: LaneSystem, points: Floats, plan: Plan, first: int) ->
     # The input itself stays 0: rounding of a state must not become an input.
     control = Control.of_states(starts[:, np.newaxis], gain, np.full(len(starts), 1e-9))
     outcome = integrate(
-        system.of(np.zeros(len(starts), dtype=np.intp)),
+        system.of(np.zeros(len(starts), dtype=np.intp)).controlled(control),
         starts,
         Plan(plan.steps_per_period, 0, 1, 1, tangent=True, method=plan.method, first_period=first),
         tangent_start=vectors,
-        control=control,
     )
     ends = outcome.end_tangent * np.exp(outcome.growth)
     return ends.reshape(count, states + 1, states)

@@ -65,10 +65,13 @@ def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
     labels = _label_record(system, outcome, plan, label.MOST_LABEL_POINTS)
     lanes = np.flatnonzero(label.doubtful(outcome.growth, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
+    ended = plan.first_period + plan.transient_periods + plan.recorded_periods
     for longer in LONGER_RECORDS:
         points = longer * min(label.MOST_LABEL_POINTS * repeats, plan.recorded_periods)
         lengths = plan.steps_per_period, 0, longer * plan.recorded_periods, points
         further = Plan(*lengths, plan.tangent, plan.resolved, method=plan.method)
+        further = further._replace(first_period=ended)
+        ended += further.recorded_periods
         # In portions, so that longer records take no more memory than the records of all lanes.
         record = 8 * (further.section_points * state.shape[1] + further.recorded_periods)
         size = max(1, system.lanes // longer, LONGER_RECORD_BYTES // record)
@@ -96,7 +99,7 @@ def _label_record(
     section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
     record = label.Record(section, outcome.growth, diverged, admits_tori(system))
     labels = label.label(record)
-    if not system.clearance:
+    if not system.clearance and system.control is None:
         _label_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, label.settling_periods(record, labels))
     lanes = np.flatnonzero(np.isin(labels.motion, (label.CHAOTIC, label.QUASI_PERIODIC)))
@@ -139,9 +142,10 @@ def admits_tori(system: LaneSystem) -> Mask:
 
     With two states and damping, the period map contracts every area by the same factor. The area
     enclosed by an invariant closed curve would stay the same, so that there is no such curve. Nor
-    is there one if a damper acts in contact only: some areas shrink, and none grows.
+    is there one if a damper acts in contact only: some areas shrink, and none grows. A controller
+    changes the factor.
     """
-    if len(system.states) > 2:
+    if len(system.states) > 2 or system.control is not None:
         return np.ones(system.lanes, dtype=np.bool_)
     return sum_of_exponents(system, np.ones((system.lanes, system.elements))) >= 0.0
 

@@ -79,8 +79,10 @@ def polish(
     Returns
     -------
     Orbits
-        A lane has no orbit if its period is 0, if Newton's method does not close the orbit within
-        the neighbourhood of the guess, or if the orbit repeats after a divisor of the period.
+        Those of the closed loop, without noise, if the system has controllers. A lane has no orbit
+        if its period is 0, if its controller has an estimate or a delay, which the state lacks, if
+        Newton's method does not close the orbit within the neighbourhood of the guess, or if the
+        orbit repeats after a divisor of the period.
 
     Notes
     -----
@@ -88,7 +90,8 @@ def polish(
     motion. A step is halved until the return distance falls. A state is measured by its largest
     magnitude on the section, or by a thousandth of the largest state if that is more.
     """
-    chosen = np.flatnonzero(period > 0)
+    remembers = system.control is not None and system.control.remembers
+    chosen = np.flatnonzero((period > 0) & (not remembers))
     orbits = Orbits(
         points=np.full(guess.shape, np.nan),
         multipliers=np.full(guess.shape, np.nan, dtype=np.complex128),

@@ -45,7 +45,11 @@ class PeriodMaps(NamedTuple):
 
     @classmethod
     def with_method(cls, system: LaneSystem, period: Counts, plan: Plan) -> Self:
-        """Return the maps with method and steps of a plan; crossings are always resolved."""
+        """Return the maps with method and steps of a plan; crossings are always resolved.
+
+        Controllers act from the beginning, without noise.
+        """
+        system = system.controlled(system.control and system.control.settled())
         longest = int(period.max()) * system.repeats_after
         steps, method = plan.steps_per_period, plan.method
         # With a tangent everywhere: maps and Jacobians share one kernel and agree bit for bit.

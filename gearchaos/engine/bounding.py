@@ -15,8 +15,9 @@ from gearchaos.dynamics.boundary_equations import (
     OnBoundary,
     Reference,
 )
+from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import Special, TracedBranch
-from gearchaos.engine.branching import BranchRange, BranchSearch, flank_name
+from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable

@@ -1,14 +1,15 @@
 """The branches of a sweep: the curves of the periodic orbits it found, and their doublings."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate
+from gearchaos_kernels import LaneSystem, integrate
 
-from gearchaos.arrays import Floats, Integers
+from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, Finding, along_the_way, defects_of
+from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import (
     LOCATED,
     SIDEWAYS,
@@ -102,45 +103,6 @@ def find_branches(
     with one_thread():
         search.follow(search.motions(result, swept[0]))
         return _described(search, result.variables[swept[0]])
-
-
-class BranchRange(NamedTuple):
-    """The range of a parameter over which branches are followed.
-
-    Attributes
-    ----------
-    system_of : callable
-        Returns the systems of the lanes at values (lanes,) of the parameter.
-    low, high : float
-        The range; shares of the way run from the first to the second.
-    """
-
-    system_of: Callable[[Floats], LaneSystem]
-    low: float
-    high: float
-
-    def value(self, share: Floats) -> Floats:
-        """Return the values of the parameter at shares of the way."""
-        return self.low + share * (self.high - self.low)
-
-    def share(self, value: Floats) -> Floats:
-        """Return the shares of the way at values of the parameter."""
-        return (value - self.low) / (self.high - self.low)
-
-    def system_at(self, shares: Floats) -> LaneSystem:
-        """Return the systems at shares of the way (lanes,)."""
-        return self.system_of(self.value(shares))
-
-    def systems_at(self, _numbers: Integers, shares: Floats) -> LaneSystem:
-        """Return the systems at shares of the way (lanes,): the same for all curves."""
-        return self.system_at(shares)
-
-    def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
-        """Return the curve of orbits of a period, with scales (states,) of the states."""
-        whole = period * self.system_at(np.zeros(1)).repeats_after
-        steps, method = plan.steps_per_period, plan.method
-        plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
-        return Curve(self.systems_at, 0, plan, period, scale)
 
 
 class BranchSearch:

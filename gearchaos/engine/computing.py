@@ -63,6 +63,8 @@ def block_memory(run: RunPlan, threads: int) -> int:
             # Doubtful lanes are integrated again, in portions of at least one lane.
             longest = 8 * numbers * LONGER_RECORDS[-1]
             looked = max(8 * numbers * lanes, longest, min(longest * lanes, LONGER_RECORD_BYTES))
+    if run.config.control is not None:
+        numbers += run.plan.transient_periods + run.plan.recorded_periods
     if run.config.outputs.exponents:
         numbers += run.plan.recorded_periods * states
     return 8 * lanes * numbers + looked + _maps_memory(run, lanes)

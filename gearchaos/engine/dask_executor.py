@@ -18,6 +18,7 @@ from dask.utils import parse_timedelta
 
 from gearchaos.arrays import Arrays
 from gearchaos.engine.computing import Bounds, EndStates, compute_block
+from gearchaos.engine.control import with_controllers
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.errors import ConfigurationError, ExecutionError
@@ -152,7 +153,8 @@ _ONE_AT_A_TIME = Lock()
 @lru_cache(maxsize=1)
 def _run_plan(configuration: str, chosen: Chosen) -> RunPlan:
     """Return the run of a configuration, kept for the next block."""
-    return plan_run(Configuration.from_toml(configuration, "<client>")).with_choice(chosen)
+    run = plan_run(Configuration.from_toml(configuration, "<client>")).with_choice(chosen)
+    return with_controllers(run)
 
 
 def _patience() -> float:

@@ -8,6 +8,7 @@ from gearchaos_kernels import Status
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.outputs.names import SECTION
+from gearchaos.records.control import CAPTURE_MEANINGS, CAPTURED, NO_GAIN, NO_ORBIT, OFF
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 CHANGE_MEANINGS = (
@@ -62,6 +63,7 @@ class Tally:
     def __init__(self, repeats: int = 1) -> None:
         self._repeats = repeats
         self.diverged = self._too_fast = self._mixed = 0
+        self._controlled = self._captured = self._without_orbit = self._without_gain = 0
         self._unsplit_lanes = self._unsplit_steps = 0
         self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD, _OF_KEPT)}
 
@@ -72,6 +74,12 @@ class Tally:
         self._unsplit_lanes += int(np.count_nonzero(arrays.get("unsplit_steps", 0)))
         self._unsplit_steps += int(np.sum(arrays.get("unsplit_steps", 0)))
         self._mixed += int(np.count_nonzero(arrays.get("record", UNIFORM) == MIXED))
+        if "capture" in arrays:
+            counts = np.bincount(arrays["capture"], minlength=len(CAPTURE_MEANINGS))
+            self._controlled += int(counts.sum() - counts[OFF])
+            self._captured += int(counts[CAPTURED])
+            self._without_orbit += int(counts[NO_ORBIT])
+            self._without_gain += int(counts[NO_GAIN])
         if "motion_changed" in arrays:
             checked = arrays["motion_changed"] != NOT_CHECKED
             arrays = {**arrays, _OF_KEPT: spread_of_kept(arrays, self._repeats)}
@@ -100,6 +108,20 @@ class Tally:
                 f"{self._mixed} lanes are periodic in the end, but chaos or another motion came "
                 "before within their records (record in the file); their exponents are those of "
                 "the orbits",
+            ),
+            (
+                self._controlled,
+                f"the controller keeps {self._captured} of {self._controlled} lanes on the orbit "
+                "in the end (capture in the file)",
+            ),
+            (
+                self._without_orbit,
+                f"{self._without_orbit} lanes ran without control: the orbit does not exist there",
+            ),
+            (
+                self._without_gain,
+                f"{self._without_gain} lanes ran without control: no gain stabilises the orbit "
+                "there",
             ),
         )
         return [text for found, text in remarks if found]

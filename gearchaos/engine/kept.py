@@ -11,6 +11,7 @@ from gearchaos.dynamics.exponents import contact_shares, exponents, sum_of_expon
 from gearchaos.dynamics.labelling import Labelled, labels_of
 from gearchaos.dynamics.largest_exponents import RECORD_MEANINGS, largest_exponents
 from gearchaos.engine import error_check
+from gearchaos.engine.capture import control_arrays, has_torque
 from gearchaos.engine.claims import completed
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.steps import solution_of
@@ -19,6 +20,7 @@ from gearchaos.outputs.entries import Part
 from gearchaos.outputs.listing import Details, for_each
 from gearchaos.outputs.variable import Variable
 from gearchaos.records.contact import CONTACT_STATES, contact_summary
+from gearchaos.records.control import CAPTURE_MEANINGS
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MOTION_MEANINGS
 
@@ -43,6 +45,8 @@ def variables_of(run: RunPlan) -> list[Variable]:
         catalogue.EXTREMES_PART: outputs.states,
         catalogue.ORDERS_PART: bool(run.plan.orders),
         catalogue.AMPLITUDES_PART: signals if run.plan.orders else (),
+        catalogue.CONTROL_PART: run.config.control is not None,
+        catalogue.CONTROL_TORQUE_PART: has_torque(run),
         catalogue.CHECK_PART: run.config.integration.error_check > 0.0,
         catalogue.EVERY_SWEEP_PART: True,
     }
@@ -56,6 +60,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
         "motion": MOTION_MEANINGS,
         names.RECORD: RECORD_MEANINGS,
         "contact_state_@": CONTACT_STATES,
+        "capture": CAPTURE_MEANINGS,
         "motion_changed": error_check.CHANGE_MEANINGS,
         names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
         names.STATE: run.lanes.states,
@@ -83,6 +88,7 @@ def arrays_of(
         arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
         arrays["unsplit_steps"] = outcome.overflows
     arrays |= recorded_quantities(run, system, outcome)
+    arrays |= control_arrays(run, lanes, system, outcome)
     for name in outputs.section:
         points = outcome.section[:, -plan.section_points :, system.states.index(name)]
         # A copy: a view would keep the whole record in memory.
@@ -105,7 +111,9 @@ def arrays_of(
             spectrum = spectrum.given(largest.of_orbit)
         arrays["lyapunov_exponents"] = spectrum.values
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
-        arrays["lyapunov_sum"] = sum_of_exponents(system, contact_shares(outcome, plan))
+        total = sum_of_exponents(system, contact_shares(outcome, plan))
+        # The damping alone does not determine the sum of a closed loop.
+        arrays["lyapunov_sum"] = total if system.control is None else np.full_like(total, np.nan)
     if run.config.integration.error_check > 0.0:
         arrays |= _check(run, lanes, start, outcome, labelled)
     return arrays

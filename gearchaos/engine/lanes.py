@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem
@@ -16,6 +17,9 @@ from gearchaos.models.protocol import Model, ParameterValue
 from gearchaos.models.registry import model_of, system_of
 from gearchaos.outputs.names import DIRECTION, HARMONIC, REALISATION, START, axis_name
 from gearchaos.outputs.variable import Variable, coordinate
+
+if TYPE_CHECKING:
+    from gearchaos.engine.control import Controllers
 
 _FEWEST_DRAWS = 12
 """Fewest random numbers that are reserved per lane, a multiple of `_PHILOX_WIDTH`."""
@@ -44,10 +48,13 @@ class Lanes:
         Directions of a carried sweep, otherwise 1.
     repeats : int
         Lanes per value, or pair of values, of the swept parameters.
+    controllers : Controllers or None
+        The controllers of the lanes; see `controlled_by`.
     """
 
     def __init__(self, config: Configuration) -> None:
         self.config = config
+        self.controllers: Controllers | None = None
         self.model = model_of(config)
         self._values = axis_values(config)
         self.axes = [
@@ -145,9 +152,19 @@ class Lanes:
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
+    def controlled_by(self, controllers: "Controllers") -> Self:
+        """Return the lanes with controllers, which the system of every lane has from then on."""
+        lanes = copy(self)
+        lanes.controllers = controllers
+        return lanes
+
     def system_of(self, lanes: Integers) -> LaneSystem:
-        """Return the system of some lanes."""
-        return system_of(self.config, self.values_of(lanes), self.effects)
+        """Return the system of some lanes, with their controllers if they have any."""
+        values = self.values_of(lanes)
+        system = system_of(self.config, values, self.effects)
+        if self.controllers is None:
+            return system
+        return system.controlled(self.controllers.of(lanes, values, system))
 
     def start_of(self, lanes: Integers, system: LaneSystem | None = None) -> Floats:
         """Return the configured start states of some lanes, shape (lanes, states).

@@ -39,6 +39,11 @@ def computable(result: Result, name: str) -> Configuration:
     """
     text = stored_text(result, name, "configuration_resolved")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
+    if config.control is not None:
+        raise ConfigurationError(
+            f"{name}: is a sweep with [control], whose lanes are not recomputed one by one; "
+            "compute the sweep without [control] for this"
+        )
     parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
     if fixed:

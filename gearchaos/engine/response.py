@@ -9,6 +9,7 @@ from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.computing import integrate_places
+from gearchaos.engine.control import with_controllers
 from gearchaos.engine.excitation import whole_lengths
 from gearchaos.engine.kept import arrays_of
 from gearchaos.engine.lanes import Lanes
@@ -55,7 +56,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
     """
     choose_threads(threads)
     config, periods = configuration_of(config), whole_number("periods", periods)
-    run = with_chosen_steps(prepared(config, periods))
+    run = with_controllers(with_chosen_steps(prepared(config, periods)))
     return compute_response(run, periods, config.text)
 
 

@@ -17,6 +17,7 @@ from gearchaos.arrays import Arrays
 from gearchaos.configuration.methods import METHODS
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.computing import Bounds, block_lanes, block_memory, blocks, rehearse
+from gearchaos.engine.control import with_controllers
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.kept import variables_of
@@ -121,7 +122,9 @@ def prepare(run: RunPlan, *, compile_now: bool = True, history_periods: int = 0)
             rehearse(run, history_periods)
         check()
     with compiling():
-        run = with_chosen_steps(run)
+        run = with_controllers(with_chosen_steps(run))
+        if compile_now and run.lanes.controllers is not None:
+            rehearse(run, history_periods)
     say(*run.notes)
     return run
 

@@ -3,6 +3,7 @@
 from gearchaos.figures.boundaries import add_boundaries, boundaries_page, draw_boundaries
 from gearchaos.figures.branches import add_branches, branches_page, draw_branches
 from gearchaos.figures.control import control_page
+from gearchaos.figures.control_sweep import control_sweep_page
 from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall
 from gearchaos.figures.ensembles import basins, basins_page, fractions, shares, shares_page
 from gearchaos.figures.maps import map_page, parameter_map

@@ -80,7 +80,7 @@ class DeclaredModel(Model):
 
 def parameters_of(lanes: type[LaneSystem]) -> tuple[str, ...]:
     """Return the names of the parameters of lanes, in their order."""
-    return tuple(field.name for field in fields(lanes))  # type: ignore[arg-type]
+    return tuple(field.name for field in fields(lanes))
 
 
 def _example_of(lanes: type[LaneSystem]) -> LaneSystem:

@@ -115,6 +115,11 @@ class Model(ABC):
         del config, values
         return Scales()
 
+    def torque(self, config: Any, values: Mapping[str, Floats]) -> Floats | None:
+        """Return the torque in N m behind the steady input of some lanes, None if not known."""
+        del config, values
+        return None
+
     def remarks(
         self, config: Any, system: LaneSystem, parameters: Mapping[str, Floats]
     ) -> Iterator[str]:

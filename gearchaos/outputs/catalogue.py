@@ -198,6 +198,44 @@ AMPLITUDES_PART = Part(
     ),
     repeated_for=(Kind.STATE, Kind.SIGNAL),
 )
+CONTROL_PART = Part(
+    "with control",
+    (
+        Output(
+            "capture",
+            "whether the controller keeps the lane on its orbit in the end",
+            dtype="uint8",
+            fill_value=None,
+        ),
+        Output("effort_largest", "largest change of the input, as a share of the steady input"),
+        Output(
+            "effort_mean",
+            "mean size of the change of the input since control began, as a share of the steady "
+            "input",
+        ),
+        Output(
+            "effort_recorded",
+            "mean size of the change of the input in the recorded periods, as a share of the "
+            "steady input",
+        ),
+    ),
+)
+CONTROL_TORQUE_PART = Part(
+    "with control of a load that follows from a torque",
+    (
+        Output("effort_largest_Nm", "largest change of the torque", scale=Quantity.TORQUE),
+        Output(
+            "effort_mean_Nm",
+            "mean size of the change of the torque since control began",
+            scale=Quantity.TORQUE,
+        ),
+        Output(
+            "effort_recorded_Nm",
+            "mean size of the change of the torque in the recorded periods",
+            scale=Quantity.TORQUE,
+        ),
+    ),
+)
 CHECK_PART = Part(
     "with an error check",
     (
@@ -293,6 +331,8 @@ PARTS = (
     EXTREMES_PART,
     ORDERS_PART,
     AMPLITUDES_PART,
+    CONTROL_PART,
+    CONTROL_TORQUE_PART,
     CHECK_PART,
     EVERY_SWEEP_PART,
     TIME_PART,

@@ -23,6 +23,7 @@ class Quantity(Enum):
     ANGLE = auto()
     ANGULAR_SPEED = auto()
     ANGULAR_ACCELERATION = auto()
+    TORQUE = auto()
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,16 @@ import numpy as np
 
 from gearchaos.arrays import Counts, Floats, Mask
 
+CLOSEST_REACH = 1e-6
+"""Largest distance of a captured motion without noise, as a share of the largest state."""
+
+NOISE_REACH = 30.0
+"""Largest distance of a captured motion with noise, in standard deviations of the noise."""
+
+CAPTURE_MEANINGS = ("not captured", "captured", "no orbit", "no gain", "off")
+"""Meanings of the values of ``capture``; in lanes with one of the last three no input is used."""
+NOT_CAPTURED, CAPTURED, NO_ORBIT, NO_GAIN, OFF = range(len(CAPTURE_MEANINGS))
+
 
 class ControlledMotion(NamedTuple):
     """Motions from several starts with a controller.
@@ -40,3 +50,37 @@ class ControlledMotion(NamedTuple):
         left = np.argmax(away[:, ::-1], axis=1)
         times = np.where(away.any(axis=1), away.shape[1] - left, 0)
         return np.where(self.captured, times, -1)
+
+
+def reach_of(noise: float | Floats) -> Floats:
+    """Return the largest distance of a captured motion, for noise in the scales of the states."""
+    reach: Floats = np.maximum(CLOSEST_REACH, NOISE_REACH * np.asarray(noise))
+    return reach
+
+
+def distance_from(
+    points: Floats, section: Floats, scale: float | Floats, repeats: int, first: int
+) -> Floats:
+    """Return the distance of section points from the points of an orbit, shape (lanes, periods).
+
+    Parameters
+    ----------
+    points : array, shape (points, states) or (points, lanes, states)
+        The orbit at the beginning of its mesh periods.
+    section : array, shape (lanes, periods, states)
+        Section points of successive mesh periods.
+    scale : float or array, shape (lanes,)
+        Largest state.
+    repeats : int
+        Mesh periods after which the excitation repeats.
+    first : int
+        Mesh periods since the beginning of the orbit at the first section point.
+    """
+    distance = np.full(section.shape[:2], np.inf)
+    each = np.reshape(np.asarray(scale), (-1, 1))
+    for number, point in enumerate(points):
+        begins = (number - first) % repeats
+        apart = np.abs(section[:, begins::repeats] - np.expand_dims(point, -2))
+        there = np.max(apart, axis=2) / each
+        distance[:, begins::repeats] = np.fmin(distance[:, begins::repeats], there)
+    return distance

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
-from gearchaos_kernels.control import Actuation, Control, Feedback
+from gearchaos_kernels.control import Actuation, Feedback
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.protocol import Share, with_periods
 from gearchaos_kernels.methods.registry import METHODS
@@ -40,9 +40,10 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, control
             number = count_up(next_block)
 
 
-def scene_of(system: LaneSystem, plan: Plan, control: Control | None = None) -> Scene:
-    """Return the scene that a system, a plan and a controller need."""
-    return _scene_of(system.flags(), system.clearance, plan, control and control.flags())
+def scene_of(system: LaneSystem, plan: Plan) -> Scene:
+    """Return the scene that a system, with its controllers, and a plan need."""
+    feedback = system.control and system.control.flags()
+    return _scene_of(system.flags(), system.clearance, plan, feedback)
 
 
 @lru_cache(maxsize=256)
@@ -74,7 +75,6 @@ def integrate(
     plan: Plan,
     *,
     tangent_start: Floats | None = None,
-    control: Control | None = None,
     periods: NDArray[np.integer] | None = None,
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0.
@@ -82,15 +82,13 @@ def integrate(
     Parameters
     ----------
     system : LaneSystem
-        The equations of motion of every lane.
+        The equations of motion of every lane, with its controllers if it has any.
     start : array, shape (lanes, states)
         States at tau = 0, in the units of the equations.
     plan : Plan
         Method, steps, periods, and what is recorded.
     tangent_start : array, shape (lanes, states), optional
         Tangent vectors at tau = 0; by default all components are equal and the length is 1.
-    control : Control, optional
-        The controller of every lane; by default there is none.
     periods : array of int, shape (lanes,), optional
         At most those of the plan, the default; shorter sections begin with NaN, growth ends with 0.
 
@@ -110,13 +108,13 @@ def integrate(
 
         outcome = integrate(pairs, start, Plan(200, 300, 100, 100, tangent=True))
     """
-    (lanes, states), scene = start.shape, scene_of(system, plan, control)
+    (lanes, states), scene = start.shape, scene_of(system, plan)
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
     recorded = _recorded_periods(plan, periods, outcome)
     for prepared in METHODS[plan.method].prepare(system, plan, scene, recorded):
         share = with_periods(prepared, recorded, plan.lanes_together(states))
         steps_taken[share.order] = share.steps[share.order]
-        _integrate_share(system, share, _Begin(start, tangent_start, control), plan, outcome, scene)
+        _integrate_share(system, share, _Begin(start, tangent_start), plan, outcome, scene)
     return _per_tau(system, plan, outcome, steps_taken, recorded, scene)
 
 
@@ -148,14 +146,13 @@ def _require_supported(scene: Scene, plan: Plan, states: int) -> None:
 
 
 class _Begin(NamedTuple):
-    """States and tangent vectors at tau = 0, both (lanes, states), and the controllers.
+    """States and tangent vectors at tau = 0, both (lanes, states).
 
     Tangent vectors that are None have equal components.
     """
 
     start: Floats
     tangent_start: Floats | None
-    control: Control | None
 
 
 def _integrate_share(
@@ -187,7 +184,7 @@ def _integrate_share(
         _turns(orders, share.steps),
         plan.frame,
     )
-    control = _actuation(begins.control, system, step, plan, outcome.inputs)
+    control = _actuation(system, step, plan, outcome.inputs)
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
@@ -208,13 +205,12 @@ def _integrate_share(
         outcome.status[share.order[lost]] = Status.TOO_FAST
 
 
-def _actuation(
-    control: Control | None, system: LaneSystem, step: Floats, plan: Plan, inputs: Floats
-) -> Actuation | Floats:
+def _actuation(system: LaneSystem, step: Floats, plan: Plan, inputs: Floats) -> Actuation | Floats:
     """Return controllers with how their input acts on lanes; an empty array if there are none.
 
     ``step`` (lanes,): length of a step in units of tau; ``inputs``: see `Outcome`.
     """
+    control = system.control
     if control is None:
         return np.zeros(0)
     model = provider_of(system.flags())

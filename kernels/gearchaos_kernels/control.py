@@ -27,6 +27,48 @@ from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
 from gearchaos_kernels.methods.protocol import begin_lane
 from gearchaos_kernels.plan import Floats
 
+CENTRE = (
+    2509.0809287301226727,
+    33430.575583588128105,
+    67265.770927008700853,
+    45921.953931549871457,
+    13731.693765509461125,
+    1971.5909503065514427,
+    133.14166789178437745,
+    3.387132872796366608,
+)
+CENTRE_BELOW = (
+    5226.495278852545925,
+    28729.085735721942674,
+    39307.89580009271061,
+    21213.794301586595867,
+    5394.1960214247511077,
+    687.1870074920579083,
+    42.313330701600911252,
+    1.0,
+)
+TAIL = (
+    7.7454501427834140764e-4,
+    0.0227238449892691845833,
+    0.24178072517745061177,
+    1.27045825245236838258,
+    3.64784832476320460504,
+    5.7694972214606914055,
+    4.6303378461565452959,
+    1.42343711074968357734,
+)
+TAIL_BELOW = (
+    1.05075007164441684324e-9,
+    5.475938084995344946e-4,
+    0.0151986665636164571966,
+    0.14810397642748007459,
+    0.68976733498510000455,
+    1.6763848301838038494,
+    2.05319162663775882187,
+    1.0,
+)
+"""Coefficients of `quantile` in the middle and in the tails, above and below the bar."""
+
 
 @dataclass(frozen=True)
 class Feedback:
@@ -66,7 +108,7 @@ class Control(NamedTuple):
     limit : array, shape (lanes,)
         Largest absolute input; a larger one is replaced by 0.
     begins : int
-        Number of the mesh period in which the control begins.
+        Number of the mesh period in which the control begins, counted from tau = 0.
     repeats : int
         Mesh periods after which the excitation repeats. The number of points is a multiple.
     measured : array of int, shape (signals,)
@@ -149,6 +191,48 @@ class Control(NamedTuple):
             np.zeros((lanes, 0, states, states)),
         )
 
+    @property
+    def remembers(self) -> bool:
+        """Whether an estimate or earlier states act on the motion, beside the state itself."""
+        return self.delay > 0 or self.transition.shape[1] > 0
+
+    def of(self, chosen: Any) -> "Control":
+        """Return the controllers of some lanes.
+
+        Parameters
+        ----------
+        chosen : array of int or slice
+            Numbers of the lanes, in the order of the new controllers.
+
+        Returns
+        -------
+        Control
+            Their controllers.
+
+        Examples
+        --------
+        >>> point = np.zeros((3, 1, 6))
+        >>> Control.of_states(point, point, np.ones(3)).of([0, 0]).limit.shape
+        (2,)
+        """
+        return self._replace(**{name: getattr(self, name)[chosen] for name in OF_LANES})
+
+    def settled(self) -> "Control":
+        """Return the controllers as they act after their beginning, without noise.
+
+        Returns
+        -------
+        Control
+            Controllers that act in every mesh period.
+
+        Examples
+        --------
+        >>> point = np.zeros((1, 1, 6))
+        >>> Control.of_states(point, point, np.ones(1))._replace(begins=9).settled().begins
+        0
+        """
+        return self._replace(begins=0, noise=np.zeros_like(self.noise))
+
     def flags(self) -> Feedback:
         """Return what the compiled loop contains of the controller.
 
@@ -165,6 +249,20 @@ class Control(NamedTuple):
         """
         estimated = True if self.transition.shape[1] else None
         return Feedback(estimated, self.delay, self.points.shape[2])
+
+
+OF_LANES = (
+    "points",
+    "gain",
+    "scales",
+    "limit",
+    "noise",
+    "seeds",
+    "transition",
+    "response",
+    "correction",
+)
+"""Fields of `Control` with one row for each lane."""
 
 
 class Actuation(NamedTuple):
@@ -213,13 +311,15 @@ def act(memory, block, period, batch, control, given, scene):
             prepare(memory, slot, control.points[index], scale, scene)
         measure(memory, slot, index, phase, control, scale, scene)
         nearest = nearest_point(memory, slot, phase, control, index, scale, scene)
-        found = chosen_input(memory, slot, index, nearest, control, scale, scene)
-        used = period >= begins and abs(found) <= control.limit[index]
+        place, at = (index, nearest), control_rows(scene)
+        found = demanded(memory, slot, place, (at.known, at.kept), 1.0, control, scene)
+        used = phase >= begins and abs(found) <= control.limit[index]
         effort = found if used else 0.0
         varied = 0.0
         if scene.tangent is not None:
             if used:
-                varied = varied_input(memory, slot, index, nearest, control, scale, scene)
+                sources = at.known_varied, at.kept_varied
+                varied = demanded(memory, slot, place, sources, 0.0, control, scene)
         predict(memory, slot, index, nearest, (effort, varied), control, scale, scene)
         strength = control.strength[index]
         coefficient = batch.coefficients[index, column] + strength * effort
@@ -265,14 +365,14 @@ def measure(memory, slot, index, phase, control, scale, scene):
             if noise > 0.0:
                 value += noise * gaussian(control.seeds[index], phase * states + state)
             memory[(known + state) * STRIDE + slot] = value
-            varied = 0.0
             if scene.tangent is not None:
                 varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-            memory[(known_varied + state) * STRIDE + slot] = varied
+                memory[(known_varied + state) * STRIDE + slot] = varied
         else:
             memory[(known + state) * STRIDE + slot] = memory[(kept + state) * STRIDE + slot]
-            varied = memory[(kept_varied + state) * STRIDE + slot]
-            memory[(known_varied + state) * STRIDE + slot] = varied
+            if scene.tangent is not None:
+                varied = memory[(kept_varied + state) * STRIDE + slot]
+                memory[(known_varied + state) * STRIDE + slot] = varied
     if scene.feedback.estimated is not None:
         place = nearest_point(memory, slot, phase, control, index, scale, scene)
         signals = control.measured.shape[0]
@@ -283,14 +383,15 @@ def measure(memory, slot, index, phase, control, scale, scene):
                 control.seeds[index], phase * signals + signal
             )
             error = value - memory[(kept + state) * STRIDE + slot]
-            varied = 0.0
-            if scene.tangent is not None:
-                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-                varied -= memory[(kept_varied + state) * STRIDE + slot]
             for row in range(states):
                 factor = control.correction[index, place, row, signal]
                 memory[(known + row) * STRIDE + slot] += factor * error
-                memory[(known_varied + row) * STRIDE + slot] += factor * varied
+            if scene.tangent is not None:
+                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
+                varied -= memory[(kept_varied + state) * STRIDE + slot]
+                for row in range(states):
+                    factor = control.correction[index, place, row, signal]
+                    memory[(known_varied + row) * STRIDE + slot] += factor * varied
 
 
 @scalar
@@ -302,6 +403,8 @@ def nearest_point(memory, slot, phase, control, index, scale, scene):
     points, repeats = control.points.shape[1], control.about[3]
     known = control_rows(scene).known
     nearest = phase % repeats
+    if points == repeats:
+        return nearest
     least = math.inf
     for point in range(phase % repeats, points, repeats):
         distance = 0.0
@@ -314,30 +417,20 @@ def nearest_point(memory, slot, phase, control, index, scale, scene):
 
 
 @scalar
-def chosen_input(memory, slot, index, nearest, control, scale, scene):
-    """Return the input that the gains demand, -K times the deviation."""
-    known, kept = control_rows(scene).known, control_rows(scene).kept
-    delay, states = control_rows(scene).delay, scale.shape[0]
+def demanded(memory, slot, place, sources, target, control, scene):
+    """Return the input that the gains demand, -K times a deviation, or its variation.
+
+    ``place``: the lane and the nearest point of the orbit; ``sources``: rows of what is known and
+    of what is kept; ``target``: 1 for the input, 0 for its variation, as the orbit does not vary.
+    """
+    (index, nearest), (known, kept) = place, sources
+    delay, states = control_rows(scene).delay, control.points.shape[2]
     total = 0.0
     for state in range(states):
-        reference = control.points[index, nearest, state]
+        reference = target * control.points[index, nearest, state]
         if delay > 0:
             reference = memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
         deviation = memory[(known + state) * STRIDE + slot] - reference
-        total -= control.gain[index, nearest, state] * deviation
-    return total
-
-
-@scalar
-def varied_input(memory, slot, index, nearest, control, scale, scene):
-    """Return the variation of the input along the tangent vector."""
-    known, kept = control_rows(scene).known_varied, control_rows(scene).kept_varied
-    delay, states = control_rows(scene).delay, scale.shape[0]
-    total = 0.0
-    for state in range(states):
-        deviation = memory[(known + state) * STRIDE + slot]
-        if delay > 0:
-            deviation -= memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
         total -= control.gain[index, nearest, state] * deviation
     return total
 
@@ -354,21 +447,25 @@ def predict(memory, slot, index, nearest, chosen, control, scale, scene):
             row = earlier * states + state
             source = at.known + state if earlier == 0 else at.kept + row - states
             memory[(at.kept + row) * STRIDE + slot] = memory[source * STRIDE + slot]
-            source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
-            memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+            if scene.tangent is not None:
+                source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
+                memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
     if scene.feedback.estimated is not None:
         following = (nearest + 1) % control.points.shape[1]
         for row in range(states):
             value = control.points[index, following, row]
             value += control.response[index, nearest, row] * effort
-            change = control.response[index, nearest, row] * varied
             for state in range(states):
                 factor = control.transition[index, nearest, row, state]
                 deviation = memory[(at.known + state) * STRIDE + slot]
                 value += factor * (deviation - control.points[index, nearest, state])
-                change += factor * memory[(at.known_varied + state) * STRIDE + slot]
             memory[(at.kept + row) * STRIDE + slot] = value
-            memory[(at.kept_varied + row) * STRIDE + slot] = change
+            if scene.tangent is not None:
+                change = control.response[index, nearest, row] * varied
+                for state in range(states):
+                    factor = control.transition[index, nearest, row, state]
+                    change += factor * memory[(at.known_varied + state) * STRIDE + slot]
+                memory[(at.kept_varied + row) * STRIDE + slot] = change
 
 
 @scalar
@@ -384,11 +481,9 @@ def scale_variations(memory, slot, length, scene):
 def gaussian(seed, number):
     """Return a normally distributed number that depends on a seed and a counter only.
 
-    Two outputs of SplitMix64 (Steele, Lea, Flood 2014) make one number (Box and Muller 1958).
+    The quantile of a uniform number, which is an output of SplitMix64 (Steele, Lea, Flood 2014).
     """
-    first = uniform(mixed(seed + np.uint64(2 * number + 1) * np.uint64(0x9E3779B97F4A7C15)))
-    second = uniform(mixed(seed + np.uint64(2 * number + 2) * np.uint64(0x9E3779B97F4A7C15)))
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    return quantile(uniform(mixed(seed + np.uint64(number + 1) * np.uint64(0x9E3779B97F4A7C15))))
 
 
 @scalar
@@ -401,5 +496,29 @@ def mixed(number):
 
 @scalar
 def uniform(number):
-    """Return a number above 0 and at most 1 from 64 bits."""
-    return (float(number >> np.uint64(11)) + 1.0) * 2.0**-53
+    """Return a number between 0 and 1, without both, from 64 bits."""
+    return (float(number >> np.uint64(12)) + 0.5) * 2.0**-52
+
+
+@scalar
+def quantile(share):
+    """Return the value that a normally distributed number is below with a probability.
+
+    Algorithm AS 241 of Wichura (1988), PPND16. Sizes above 6.7, one in 4e10, are cut to it.
+    """
+    middle = share - 0.5
+    if abs(middle) <= 0.425:
+        r = 0.180625 - middle * middle
+        return middle * horner(r, CENTRE) / horner(r, CENTRE_BELOW)
+    r = min(math.sqrt(-math.log(min(share, 1.0 - share))), 5.0) - 1.6
+    size = horner(r, TAIL) / horner(r, TAIL_BELOW)
+    return size if middle > 0.0 else -size
+
+
+@scalar
+def horner(x, coefficients):
+    """Return a polynomial whose coefficients begin with that of the highest power."""
+    total = 0.0
+    for coefficient in coefficients:
+        total = total * x + coefficient
+    return total

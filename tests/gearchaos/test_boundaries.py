@@ -10,8 +10,8 @@ from gearchaos_kernels import Plan
 
 import gearchaos
 from gearchaos.dynamics.boundary_equations import Equations
+from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
-from gearchaos.engine.branching import BranchRange
 from gearchaos.engine.running import one_thread
 from gearchaos.models.registry import system_of
 from gearchaos.records.boundary import BOUNDARY_ENDS, CUSP

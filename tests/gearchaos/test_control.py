@@ -11,8 +11,9 @@ import scipy.stats
 from gearchaos_kernels import Plan, integrate
 
 import gearchaos
-from gearchaos.controlling.controller import Controller, ControlSettings
+from gearchaos.controlling.controller import Controller
 from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controllable
+from gearchaos.dynamics.controllers import ControlSettings
 from gearchaos.errors import ConfigurationError
 
 from .commands import run_module
@@ -70,9 +71,8 @@ def test_the_frame_of_the_closed_loop_has_the_designed_multipliers(method):
     found = controller(method=method)
     plan = Plan(12, 0, 1, 1, tangent=True, method="flow_map")
     system, point = found.system.equations.of(np.zeros(6, dtype=int)), found.orbit.point
-    outcome = integrate(
-        system, np.tile(point, (6, 1)), plan, tangent_start=np.eye(6), control=found.control(6)
-    )
+    controlled = system.controlled(found.control(6))
+    outcome = integrate(controlled, np.tile(point, (6, 1)), plan, tangent_start=np.eye(6))
     frame = (outcome.end_tangent * np.exp(outcome.growth)).T
     expected = np.sort_complex(found.closed_multipliers)
     np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(frame)), expected, atol=1e-8)

@@ -1,10 +1,9 @@
 """Control of an input: against NumPy, its tangent vector, its noise, and determinism."""
 
-import math
-
 import numpy as np
 import pytest
 from gearchaos_kernels import Control, Plan, integrate
+from scipy.special import ndtri
 
 from .oscillator import Oscillators
 
@@ -22,12 +21,9 @@ def split_mix(number: int) -> int:
 
 
 def gaussian(seed: int, number: int) -> float:
-    """Return a normally distributed number (Box and Muller 1958)."""
-    first, second = (
-        (float(split_mix((seed + (2 * number + n) * GOLDEN) % WHOLE) >> 11) + 1.0) * 2.0**-53
-        for n in (1, 2)
-    )
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    """Return a normally distributed number, the quantile of a uniform one."""
+    share = (float(split_mix((seed + (number + 1) * GOLDEN) % WHOLE) >> 12) + 0.5) * 2.0**-52
+    return float(ndtri(share))
 
 
 def oscillators(lanes: int) -> Oscillators:
@@ -49,7 +45,7 @@ def controlled(lanes: int, points: int = 1) -> Control:
 def test_each_input_is_what_the_gain_demands(method: str, steps: int) -> None:
     system, control = oscillators(9), controlled(9, points=3)
     start = np.zeros((9, 2))
-    outcome = integrate(system, start, Plan(steps, 2, 18, 20, method=method), control=control)
+    outcome = integrate(system.controlled(control), start, Plan(steps, 2, 18, 20, method=method))
     states = np.concatenate([start[:, np.newaxis], outcome.section[:, :-1]], axis=1)
     deviation = states[:, :, np.newaxis] - control.points[:, np.newaxis]
     nearest = np.argmin(np.sum(deviation**2, axis=3), axis=2)
@@ -66,7 +62,7 @@ def test_an_input_acts_as_a_load_of_this_size(method: str, steps: int) -> None:
     """Each mesh period by itself, with the load that the controller has chosen."""
     system, control = oscillators(5), controlled(5)
     plan = Plan(steps, 0, 6, 6, method=method, contact=True)
-    outcome = integrate(system, np.zeros((5, 2)), plan, control=control)
+    outcome = integrate(system.controlled(control), np.zeros((5, 2)), plan)
     state = np.zeros((5, 2))
     for period in range(6):
         loaded = system.replace(load=system.load + outcome.inputs[:, period])
@@ -83,34 +79,17 @@ def test_the_tangent_vector_is_that_of_the_closed_loop(method: str, steps: int) 
     vectors = np.eye(2)
     plan = Plan(steps, 0, 3, 3, tangent=True, method=method)
     both = system.of(np.zeros(2, dtype=np.intp))
-    given = control._replace(
-        **{name: np.repeat(getattr(control, name), 2, axis=0) for name in REPEATED}
-    )
-    ended = integrate(both, np.tile(start, (2, 1)), plan, tangent_start=vectors, control=given)
+    given = control.of([0, 0])
+    ended = integrate(both.controlled(given), np.tile(start, (2, 1)), plan, tangent_start=vectors)
     found = (ended.end_tangent * np.exp(np.sum(ended.growth, axis=1))[:, np.newaxis]).T
     assert np.all(ended.inputs != 0.0)
     h = 1e-6
     around = start + h * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     four = system.of(np.zeros(4, dtype=np.intp))
-    given = control._replace(
-        **{name: np.repeat(getattr(control, name), 4, axis=0) for name in REPEATED}
-    )
-    ends = integrate(four, around, plan, control=given).end_state
+    given = control.of([0, 0, 0, 0])
+    ends = integrate(four.controlled(given), around, plan).end_state
     expected = np.column_stack([ends[0] - ends[1], ends[2] - ends[3]]) / (2.0 * h)
     np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-7)
-
-
-REPEATED = (
-    "points",
-    "gain",
-    "scales",
-    "limit",
-    "noise",
-    "seeds",
-    "transition",
-    "response",
-    "correction",
-)
 
 
 def test_an_estimate_follows_its_equations() -> None:
@@ -125,7 +104,7 @@ def test_an_estimate_follows_its_equations() -> None:
         response=rng.normal(size=(lanes, 1, 2)),
         correction=0.5 * rng.normal(size=(lanes, 1, 2, 1)),
     )
-    outcome = integrate(system, np.zeros((lanes, 2)), Plan(40, 0, 12, 12), control=control)
+    outcome = integrate(system.controlled(control), np.zeros((lanes, 2)), Plan(40, 0, 12, 12))
     for lane in range(lanes):
         target, gain = control.points[lane, 0], control.gain[lane, 0]
         estimate, state = target.copy(), np.zeros(2)
@@ -143,7 +122,7 @@ def test_an_estimate_follows_its_equations() -> None:
 
 def test_delayed_feedback_compares_with_an_earlier_state() -> None:
     control = controlled(2)._replace(delay=2, limit=np.full(2, 10.0))
-    outcome = integrate(oscillators(2), np.zeros((2, 2)), Plan(40, 0, 8, 8), control=control)
+    outcome = integrate(oscillators(2).controlled(control), np.zeros((2, 2)), Plan(40, 0, 8, 8))
     states = np.concatenate([np.zeros((2, 3, 2)), outcome.section[:, :-1]], axis=1)
     expected = -np.einsum("ls,lns->ln", control.gain[:, 0], states[:, 2:] - states[:, :-2])
     np.testing.assert_allclose(outcome.inputs, expected, atol=1e-14)
@@ -167,10 +146,9 @@ def test_bits_do_not_depend_on_the_lanes_beside(method: str, steps: int) -> None
         noise=np.full((lanes, 2), 0.01), seeds=rng.integers(0, 2**63, lanes, dtype=np.uint64)
     )
     system, start = oscillators(lanes), np.zeros((lanes, 2))
-    whole = integrate(system, start, plan, control=control)
+    whole = integrate(system.controlled(control), start, plan)
     some = np.array([69, 3, 40, 41])
-    given = control._replace(**{name: getattr(control, name)[some] for name in REPEATED})
-    part = integrate(system.of(some), start[some], plan, control=given)
+    part = integrate(system.controlled(control).of(some), start[some], plan)
     for name in ("section", "growth", "inputs", "end_tangent"):
         assert np.array_equal(getattr(whole, name)[some], getattr(part, name))
 
@@ -178,7 +156,7 @@ def test_bits_do_not_depend_on_the_lanes_beside(method: str, steps: int) -> None
 def test_control_begins_at_its_period() -> None:
     control = controlled(4)._replace(begins=5)
     plan = Plan(40, 0, 10, 10)
-    outcome = integrate(oscillators(4), np.zeros((4, 2)), plan, control=control)
+    outcome = integrate(oscillators(4).controlled(control), np.zeros((4, 2)), plan)
     free = integrate(oscillators(4), np.zeros((4, 2)), plan)
     assert np.all(outcome.inputs[:, :5] == 0.0)
     assert np.any(outcome.inputs[:, 5:] != 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Sweep
-from gearchaos.configuration.tables import swept_values
+from gearchaos.configuration.tables import OF_CONTROLLERS, swept_values
 from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.derivation import derive_groups, paths_behind
 from gearchaos.models.gear_pair.group_table import (
@@ -45,7 +45,8 @@ def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
         drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
         known = sweep.parameter in SWEEPABLE_GROUPS or not missing
-        if known and not drawn and not _moved(config, groups, axis, sweep.size):
+        own = sweep.parameter in OF_CONTROLLERS
+        if known and not drawn and not own and not _moved(config, groups, axis, sweep.size):
             yield _without_effect(config, table, some[sweep.parameter])
 
 

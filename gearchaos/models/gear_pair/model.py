@@ -34,6 +34,9 @@ from gearchaos.models.gear_pair.tables import groups_at, physical_at
 from gearchaos.models.gear_pair.tooth_deviations import tooth_deviations
 from gearchaos.models.protocol import Model, ParameterValue, Scales, accelerations
 
+TORQUE = "operation.torque_Nm"
+"""The key from which the load follows."""
+
 
 class GearPairModel(Model):
     """A helical gear pair with pitch error (Pan 2021, eq. 13)."""
@@ -123,6 +126,12 @@ class GearPairModel(Model):
         )
         speed = None if config.pair is None else 60.0 / config.pair.teeth[0]
         return Scales(frequency, speed, length)
+
+    def torque(self, config: GearPairConfiguration, values: Mapping[str, Floats]) -> Floats | None:
+        """Return the torque on the driving gear, None where the load does not follow from it."""
+        if groups_at(config, values).origin["load"] != "derived":
+            return None
+        return np.asarray(physical_at(config, values)[TORQUE], dtype=np.float64)
 
     def remarks(
         self, config: GearPairConfiguration, system: LaneSystem, parameters: Mapping[str, Floats]

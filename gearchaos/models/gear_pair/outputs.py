@@ -119,6 +119,7 @@ CATALOGUE = Catalogue(
         "give [pair] and [mesh] with mean_stiffness_N_per_um_mm and length_scale_um",
     ),
     parameters={"mesh_frequency": Quantity.MESH_FREQUENCY},
+    units={Quantity.TORQUE: "N m"},
     long_names={
         names.REALISATION: "drawn gear pair",
         "contact_@": "contact in the @ direction",

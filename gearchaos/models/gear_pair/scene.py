@@ -56,6 +56,10 @@ class Start(run_tables.Start[State]):
     """The state in which the lanes start."""
 
 
+class Control(run_tables.Control[State]):
+    """A controller that keeps every lane on a periodic orbit by small changes of the load."""
+
+
 class Outputs(run_tables.Outputs[State]):
     """The kept outputs of every lane."""
 

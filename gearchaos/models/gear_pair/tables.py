@@ -11,7 +11,7 @@ from pydantic import create_model
 from gearchaos.arrays import Integers
 from gearchaos.configuration.keys import Key, Table, key, keys_of
 from gearchaos.configuration.messages import suggestion
-from gearchaos.configuration.tables import Parameter, Tables, Titled
+from gearchaos.configuration.tables import OF_CONTROLLERS, Parameter, Tables, Titled
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.models.gear_pair.group_table import (
     GROUP_TABLE,
@@ -29,7 +29,7 @@ from gearchaos.models.gear_pair.physical_tables import (
     Pair,
     PitchError,
 )
-from gearchaos.models.gear_pair.scene import Outputs, Scene, Start, states_of
+from gearchaos.models.gear_pair.scene import Control, Outputs, Scene, Start, states_of
 from gearchaos.outputs.names import REALISATION
 
 
@@ -113,20 +113,23 @@ PARAMETERS = MappingProxyType(
         path: Parameter(path, path, key.valid, key.units or "1", key.wording)
         for path, key in SWEEPABLE_KEYS.items()
     }
+    | OF_CONTROLLERS
 )
-"""Groups and physical keys that a sweep may vary, by name."""
+"""Groups, physical keys and keys of controllers that a sweep may vary, by name."""
 
 
 class GearPairTables(Tables, PhysicalTables):
     """All tables of a configuration of gear pairs."""
 
     parameters = PARAMETERS
+    actuators = ("load",)
     realisation_words = "drawn gear pairs"
     tables_of_lanes = frozenset({"sweep", "second_sweep", "scene", "groups", *PHYSICAL_TABLES})
 
     scene: Scene = key("which effects exist")
     start: Start = key("the state in which the lanes start", default=Start())
     outputs: Outputs = key("the kept outputs of every lane", default=Outputs())
+    control: Control | None = key("a controller of every lane", default=None)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -160,6 +163,7 @@ class GearPairTables(Tables, PhysicalTables):
         """
         without_axial = states_of({"transverse"})
         kept = {*self.outputs.section, *self.outputs.states}
+        kept |= {*self.control.measured} if self.control else set()
         if self.outputs.lyapunov or not kept.issubset(without_axial):
             return self.scene.effects
         return tuple(effect for effect in self.scene.effects if effect != "axial")
@@ -198,7 +202,7 @@ def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> Re
     for parameter, value in values.items():
         if parameter in SWEEPABLE_GROUPS:
             given[parameter] = value
-        elif parameter != REALISATION and parameter not in SWEEPABLE_KEYS:
+        elif parameter not in {REALISATION, *SWEEPABLE_KEYS, *OF_CONTROLLERS}:
             raise KeyError(parameter)
     return resolve_groups(physical, given)
 

@@ -117,9 +117,10 @@ def systems_of(machines: Sequence[Machine], kinds: Kinds) -> LinearSystems:
         "reaction": columns.reaction,
         "force": columns.force,
     }
+    solved: Any = {n: np.linalg.solve(columns.mass, matrix) for n, matrix in over_mass.items()}
     return LinearSystems(
         frequency=columns.frequency,
-        **{name: np.linalg.solve(columns.mass, matrix) for name, matrix in over_mass.items()},
+        **solved,
         gap=columns.gap,
         motion=columns.motion,
         stiffness=columns.contact_stiffness,

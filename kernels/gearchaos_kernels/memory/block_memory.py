@@ -17,6 +17,7 @@ from gearchaos_kernels.memory.rows import (
     VECTOR,
     ContactBranch,
     State,
+    control_rows,
     rows,
     rows_of,
 )
@@ -266,3 +267,11 @@ def numbers_of(count: Callable[[Scene], int]) -> Any:
 
 numbers_of_elements = numbers_of(lambda scene: provider_of(scene.model).elements(scene.model))
 """Read one number per element; arguments: array, place of the first one, scene."""
+
+
+@scalar
+def read_varied_input(memory, slot, scene):
+    """Return the variation of the steady input along the tangent vector, None without control."""
+    if scene.control is None:
+        return None
+    return memory[control_rows(scene).varied * STRIDE + slot]

@@ -2,8 +2,8 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,13 @@ from gearchaos_kernels.models.mesh_phase import (
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import provider_of
 
+if TYPE_CHECKING:
+    from gearchaos_kernels.control import Control
+
 _Chosen = slice | NDArray[np.intp] | list[int]
 
 
+@dataclass(frozen=True, eq=False)
 class LaneSystem(ABC):
     """The equations of motion of a batch of lanes.
 
@@ -29,6 +33,8 @@ class LaneSystem(ABC):
 
     Attributes
     ----------
+    control : Control or None
+        The controllers of the lanes, see `controlled`; None by default.
     unit_inputs : mapping of str to float
         Fields on which flow maps do not depend, such as loads and clearances, with their values in
         a system of unit inputs. Only `of_unit_inputs` and `map_parameters` read it.
@@ -55,6 +61,7 @@ class LaneSystem(ABC):
                 return np.ones(self.lanes)
     """
 
+    control: "Control | None" = field(default=None, kw_only=True)
     unit_inputs: ClassVar[Mapping[str, float]] = {}
 
     @property
@@ -194,7 +201,29 @@ class LaneSystem(ABC):
 
             first = pairs.of(slice(0, 1))
         """
-        return self.replace(**{field: getattr(self, field)[chosen] for field in self._parameters()})
+        some = {name: getattr(self, name)[chosen] for name in self._parameters()}
+        return self.replace(**some, control=self.control and self.control.of(chosen))
+
+    def controlled(self, control: "Control | None") -> Self:
+        """Return the system with controllers, which act whenever it is integrated.
+
+        Parameters
+        ----------
+        control : Control or None
+            The controller of every lane, or None for a system without control.
+
+        Returns
+        -------
+        LaneSystem
+            A system of the same kind.
+
+        Examples
+        --------
+        ::
+
+            outcome = integrate(pairs.controlled(control), start, plan)
+        """
+        return self.replace(control=control)
 
     def replace(self, **changes: Any) -> Self:
         """Return the system with other values of some fields.
@@ -215,7 +244,7 @@ class LaneSystem(ABC):
 
             wider = oscillators.replace(half_clearance=2.0 * oscillators.half_clearance)
         """
-        return replace(self, **changes)  # type: ignore[type-var]
+        return replace(self, **changes)
 
     def repeated(self, times: int) -> Self:
         """Return the system with every lane n times in a row.
@@ -240,7 +269,7 @@ class LaneSystem(ABC):
 
     def _parameters(self) -> list[str]:
         """Return the names of the parameters of the lanes."""
-        return [field.name for field in fields(self)]  # type: ignore[arg-type]
+        return [one.name for one in fields(self) if one.name != "control"]
 
     def with_steady_input(self, values: Floats) -> Self:
         """Return the system with other steady inputs, shape (lanes,), in place of its own.

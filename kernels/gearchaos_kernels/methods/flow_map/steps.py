@@ -11,6 +11,7 @@ from gearchaos_kernels.contact.branches import suspects_of
 from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
+    read_varied_input,
     state_before,
     state_of,
     store,
@@ -21,7 +22,6 @@ from gearchaos_kernels.memory.rows import (
     VECTOR,
     ContactBranch,
     State,
-    control_rows,
     rows,
 )
 from gearchaos_kernels.memory.tuples import along, each
@@ -150,8 +150,7 @@ def gather(memory, numbers, scene):
         if scene.tangent is not None:
             numbers[place.tangent_inputs + line] = memory[(at.tangent_before + line) * STRIDE]
     if scene.control is not None:
-        varied = memory[control_rows(scene).varied * STRIDE]
-        numbers[place.tangent_inputs + place.states] = varied
+        numbers[place.tangent_inputs + place.states] = read_varied_input(memory, 0, scene)
     for number in range(place.columns - place.states):
         row = method_rows(scene).inputs + number
         numbers[place.states + number] = memory[row * STRIDE]

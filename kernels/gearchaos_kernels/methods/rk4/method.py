@@ -13,6 +13,7 @@ from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
     read_state,
+    read_varied_input,
     slots_of,
     state_of,
     write_state,
@@ -112,7 +113,7 @@ def step(memory, lanes, at, given, scene):
             tangent = read_state(memory, rows(scene).tangent, slot, scene)
             if scene.resolved is not None:
                 write_state(memory, rows(scene).tangent_before, slot, tangent, scene)
-            varied = rk4.varied_input(memory, slot, scene)
+            varied = read_varied_input(memory, slot, scene)
             tangent, _ = rk4.advance(rk4.tangent_stage, tangent, 1.0, lane, pushes, varied, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
     if scene.switches is not None:

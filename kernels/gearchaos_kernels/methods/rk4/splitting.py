@@ -14,6 +14,7 @@ from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
     read_state,
+    read_varied_input,
     state_before,
     state_of,
     write_branches,
@@ -58,7 +59,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
     branches = read_branches(memory, slot, scene)
-    varied = rk4.varied_input(memory, slot, scene)
+    varied = read_varied_input(memory, slot, scene)
     crossings = 0
     while True:
         left = until - done

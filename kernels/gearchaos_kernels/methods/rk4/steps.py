@@ -15,7 +15,7 @@ For a whole step s is the constant 1, which the compiler removes.
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.elements import pushes_of, tangent_pushes
-from gearchaos_kernels.memory.rows import STRIDE, State, control_rows
+from gearchaos_kernels.memory.rows import State
 from gearchaos_kernels.memory.tuples import along
 from gearchaos_kernels.models.interfaces import (
     accelerations,
@@ -66,14 +66,6 @@ def tangent_stage(vector, lane, pushes, varied, scene):
     if scene.control is None:
         return accelerations(vector, added, unforced(lane, scene), lane, scene), pushes
     return accelerations(vector, added, driven(lane, varied, scene), lane, scene), pushes
-
-
-@scalar
-def varied_input(memory, slot, scene):
-    """Return the variation of the steady input along the tangent vector, None without control."""
-    if scene.control is None:
-        return None
-    return memory[control_rows(scene).varied * STRIDE + slot]
 
 
 @scalar

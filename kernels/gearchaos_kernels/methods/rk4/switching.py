@@ -13,6 +13,7 @@ from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
     read_state,
+    read_varied_input,
     state_before,
     state_of,
     write_state,
@@ -98,7 +99,7 @@ def take_part(memory, slot, at, first, last, tables, scene):
         write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
         if scene.tangent is not None:
             tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
-            varied = rk4.varied_input(memory, slot, scene)
+            varied = read_varied_input(memory, slot, scene)
             tangent = advance_tangent(tangent, length, lane, pushes, varied, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
     if scene.resolved is not None:

@@ -52,6 +52,8 @@ class GearPairs(LaneSystem):
         Dimensionless groups of eqs 8-13, each an array of shape (lanes,).
     stiffness_cosine, stiffness_sine : array, shape (harmonics,)
         Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
+    control : Control or None
+        The controllers of the pairs, see `LaneSystem.controlled`.
     physical : bool
         Whether the gaps contain delta_5 + e, as follows from eq. 1, or delta_5 alone, as printed in
         eqs 6 and 7.
@@ -246,7 +248,8 @@ class GearPairs(LaneSystem):
         """Return the system of some lanes, in the order given."""
         teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[chosen])
         groups = Groups(*(group[chosen] for group in self.groups))
-        return self.replace(groups=groups, teeth=teeth)
+        control = self.control and self.control.of(chosen)
+        return self.replace(groups=groups, teeth=teeth, control=control)
 
 
 class MeshMotion(NamedTuple):

@@ -1,0 +1,56 @@
+"""Capture and effort of controlled lanes, as a result keeps them."""
+
+import gearchaos_kernels as kernels
+import numpy as np
+
+from gearchaos.arrays import Array, Integers
+from gearchaos.engine.run_plan import RunPlan
+from gearchaos.records.control import CAPTURED, NOT_CAPTURED, distance_from, reach_of
+
+HELD = 16
+"""Excitation periods at the end over which a captured lane stays on the orbit."""
+
+EFFORTS = ("largest", "mean", "recorded")
+"""Endings of the names of efforts."""
+
+
+def has_torque(run: RunPlan) -> bool:
+    """Whether efforts of a controlled run are known in N m."""
+    if run.config.control is None:
+        return False
+    return run.lanes.model.torque(run.config, run.lanes.values_of(np.arange(1))) is not None
+
+
+def control_arrays(
+    run: RunPlan, lanes: Integers, system: kernels.LaneSystem, outcome: kernels.Outcome
+) -> dict[str, Array]:
+    """Return capture and effort of lanes (lanes,) by variable; nothing without controllers."""
+    control, controllers = system.control, run.lanes.controllers
+    if control is None or controllers is None:
+        return {}
+    values = run.lanes.values_of(lanes)
+    state = controllers.states_of(lanes, values)
+    repeats, points = system.repeats_after, outcome.section.shape[1]
+    distance = distance_from(
+        control.points.swapaxes(0, 1),
+        outcome.section,
+        control.scales.max(axis=1),
+        repeats,
+        1 - points,
+    )
+    noise, last = controllers.noise_of(lanes, values), slice(-HELD * repeats, None)
+    held = (distance[:, last] <= reach_of(noise)[:, np.newaxis]).all(axis=1)
+    # With noise the motion may be near the orbit by chance; without, an input may be exactly 0.
+    held &= (noise == 0.0) | (outcome.inputs[:, last] != 0.0).all(axis=1)
+    state[(state == NOT_CAPTURED) & held] = CAPTURED
+    share = np.abs(outcome.inputs) / np.abs(system.steady_input)[:, np.newaxis]
+    share[outcome.status != kernels.Status.OK] = np.nan
+    acting = share[:, min(control.begins, share.shape[1] - 1) :]
+    recorded = share[:, run.plan.transient_periods :]
+    efforts = acting.max(axis=1), acting.mean(axis=1), recorded.mean(axis=1)
+    arrays: dict[str, Array] = {"capture": state}
+    arrays |= {f"effort_{name}": values for name, values in zip(EFFORTS, efforts, strict=True)}
+    torque = controllers.torque_of(lanes, values)
+    if torque is not None:
+        arrays |= {f"{name}_Nm": arrays[name] * torque for name in [*arrays][1:]}
+    return arrays
