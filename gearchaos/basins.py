@@ -66,9 +66,11 @@ def _basins(options: BasinsOptions) -> None:
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.outputs.names import REPEATS, START
+    from gearchaos.results.reading.listed import list_basins
     from gearchaos.results.reading.overview import json_values, slice_lines
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
+    from gearchaos.results.reading.tables import csv_text
 
     one_format(options.json, options.csv)
     whole = open_result(options.result)
@@ -83,7 +85,7 @@ def _basins(options: BasinsOptions) -> None:
     if options.json:
         print(json.dumps(json_values(_facts(found, where)), indent=1))
     elif options.csv:
-        print(_csv(found))
+        print(csv_text(*list_basins(found)))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
@@ -92,6 +94,8 @@ def _basins(options: BasinsOptions) -> None:
 
 def _facts(found: "Basins", where: Any) -> dict[str, Any]:
     """Return what --json prints."""
+    from gearchaos.results.reading.listed import unit_of_axis
+
     basins = [one._asdict() for one in found.basins]
     for one in basins:
         # The section of a motion without a period would have a thousand points.
@@ -99,7 +103,7 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
         one["number"] = one["number"] if one["number"] > 0 else None
     return {
         "parameter": found.parameter,
-        "unit": _unit(found),
+        "unit": unit_of_axis(found.result, found.parameter),
         "slice": where,
         "starts": found.numbers.shape[1],
         "basins": basins,
@@ -107,35 +111,12 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
     }
 
 
-def _unit(found: "Basins") -> str:
-    """Return the unit of the parameter as plain text."""
-    from gearchaos.results.reading.tables import unit_text
-
-    result = found.result
-    known = result.variables | result.fixed_axes
-    return unit_text(known[found.parameter]) if found.parameter in known else "1"
-
-
-def _csv(found: "Basins") -> str:
-    """Return what --csv prints: a row for each basin."""
-    from gearchaos.results.reading.tables import csv_text
-
-    headings = [f"{found.parameter} [{_unit(found)}]", "number", "motion", "period [1]"]
-    headings += ["multiplier [1]", "exponent [per unit of tau]", "starts [1]", "share [1]"]
-    headings += ["share, 95 % from [1]", "share, 95 % to [1]"]
-    rows = (
-        (
-            *(one.value, one.number if one.number > 0 else "", one.motion, one.period),
-            *(one.multiplier, one.exponent, one.starts, one.share, *one.share_95_percent),
-        )
-        for one in found.basins
-    )
-    return csv_text(headings, rows)
-
-
 def table(found: "Basins", where: list[str]) -> Iterator[str]:
     """Return the basins as lines of a table, each of at most 80 characters."""
-    unit = "" if _unit(found) == "1" else f" [{_unit(found)}]"
+    from gearchaos.results.reading.listed import unit_of_axis
+
+    unit = unit_of_axis(found.result, found.parameter)
+    unit = "" if unit == "1" else f" [{unit}]"
     yield f"basins over {found.parameter}{unit}, {found.numbers.shape[1]} starts at each value"
     yield from where
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"

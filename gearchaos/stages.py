@@ -89,9 +89,11 @@ class Listing(NamedTuple):
 
 def _stages(options: StagesOptions) -> None:
     from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
+    from gearchaos.results.reading.listed import list_stages
     from gearchaos.results.reading.overview import json_values
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import one_axis, require_labels
+    from gearchaos.results.reading.tables import csv_text
 
     one_format(options.json, options.csv)
     whole = open_result(options.result)
@@ -107,7 +109,7 @@ def _stages(options: StagesOptions) -> None:
     if options.json:
         print(json.dumps(json_values(_facts(listing)), indent=1))
     elif options.csv:
-        print(_csv(listing))
+        print(csv_text(*list_stages(listing.result, listing.stages)))
     else:
         print(_text(listing))
 
@@ -151,9 +153,11 @@ def _listing(
 
 def _facts(listing: Listing) -> dict[str, Any]:
     """Return what --json prints."""
+    from gearchaos.results.reading.listed import unit_of_axis
+
     return {
         "parameter": listing.result.axis,
-        "unit": _unit(listing.result, listing.result.axis),
+        "unit": unit_of_axis(listing.result, listing.result.axis),
         "slice": listing.where,
         "stages": listing.stages,
         **({} if listing.apart is None else {"directions_apart": listing.apart}),
@@ -164,37 +168,11 @@ def _facts(listing: Listing) -> dict[str, Any]:
     }
 
 
-def _unit(result: "Result", name: str) -> str:
-    """Return the unit of a variable as plain text."""
-    from gearchaos.results.reading.tables import unit_text
-
-    return unit_text(result.variables[name])
-
-
-def _csv(listing: Listing) -> str:
-    """Return what --csv prints: a row for each stage."""
-    from gearchaos.outputs.names import LARGEST_EXPONENT
-    from gearchaos.results.reading.tables import csv_text
-
-    result = listing.result
-    unit = _unit(result, result.axis)
-    rate = _unit(result, LARGEST_EXPONENT) if LARGEST_EXPONENT in result else "1"
-    headings = [f"from [{unit}]", f"to [{unit}]", "motion", "period [1]", "lanes [1]"]
-    headings += [f"lowest exponent [{rate}]", f"highest exponent [{rate}]", "most bands [1]"]
-    rows = (
-        (
-            *(one.start, one.end, one.label, one.period, one.lanes),
-            *(one.lowest_exponent, one.highest_exponent, max(one.bands, default=0)),
-        )
-        for one in listing.stages
-    )
-    return csv_text(headings, rows)
-
-
 def _text(listing: Listing) -> str:
     """Return the table of the stages, then remarks, then boundaries."""
     from gearchaos.outputs.names import RECORD, REPEATS
     from gearchaos.results.reading.excitation import excitation_of
+    from gearchaos.results.reading.listed import unit_of_axis
     from gearchaos.results.reading.overview import slice_lines
 
     result = listing.result
@@ -205,7 +183,7 @@ def _text(listing: Listing) -> str:
     ]
     head += [*slice_lines(listing.where), excitation_of(result.metadata).in_words]
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    unit = _unit(result, result.axis)
+    unit = unit_of_axis(result, result.axis)
     unit = "" if unit == "1" else f" {unit}"
     below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed, unit)]
     below += directions_apart(listing.apart or ())

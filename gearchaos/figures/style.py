@@ -1,7 +1,7 @@
 """How the figures look: sizes for a journal column, and colours that also print in grey."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -78,9 +78,12 @@ def with_font(name: str | None) -> Iterator[None]:
 
 
 @contextmanager
-def styled() -> Iterator[None]:
-    """Set the project's style within a context; other threads wait before they draw pages."""
-    with DRAWING, mpl.rc_context(style()):
+def styled(settings: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Set the project's style within a context; other threads wait before they draw pages.
+
+    ``settings``: of matplotlib, in place of those of the style.
+    """
+    with DRAWING, mpl.rc_context(style() | dict(settings or {})):
         yield
 
 
