@@ -7,7 +7,6 @@ A sweep, a map, drawn gear pairs, starts, a response, branches and boundaries ha
 own. For a third axis there is a set of figures for each of its values, at most 6; --at chooses one.
 """
 
-from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from gearchaos.command_line import Command
@@ -53,8 +52,7 @@ def _report(options: ReportOptions) -> None:
     from gearchaos.results.reading.result import open_result
 
     output = output_of(options.output, options.result, ".html")
-    if not Path(output).exists() or not options.overwrite:
-        check_output(output)
+    check_output(output, options.overwrite)
     with notice(f"drawing {options.result}"):
         content = curves_report(options.result)
         if content is None:

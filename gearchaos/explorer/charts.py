@@ -1,8 +1,6 @@
 """Diagram, exponent chart and map of a sweep, redrawn at every zoom."""
 
-import re
 from typing import Any
-from unicodedata import lookup
 
 import holoviews as hv
 import numpy as np
@@ -12,6 +10,8 @@ from holoviews.operation.downsample import downsample1d
 from matplotlib.colors import ListedColormap, to_hex
 from matplotlib.figure import Figure
 
+from gearchaos.explorer.shades import COLOURS
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
@@ -26,8 +26,6 @@ Charts = tuple[list[Any], dict[str, str]]
 GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
 """Greys of pixels, from few points to many."""
 
-COLOURS = 256  # Most colours of a map.
-
 FILLED = 0.05
 """Share of filled pixels of a diagram below which dots are enlarged by one pixel."""
 
@@ -39,9 +37,6 @@ VALUE = "z"
 
 DRAWN = 4000
 """Most points of a line; a longer line is reduced to its outline."""
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
 
 
 def diagram(result: Result, variable: str) -> Charts:
@@ -85,22 +80,6 @@ def two_parameter_map(result: Result, variable: str) -> Charts:
     look |= {"colorbar": not isinstance(colours, ListedColormap), "height": 580}
     chart = rasterize(mesh, aggregator=highest()).opts(responsive=True, **look)
     return [chart], {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
-
-
-def plain_text(label: str) -> str:
-    """Write a label in Unicode without formulae, such as δ₅' for ``$\\delta_5'$``."""
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
-    text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
-    text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
-    return re.sub(r"[${}\\]", "", text)
-
-
-def _letter(name: str) -> str:
-    case = "CAPITAL" if name[0].isupper() else "SMALL"
-    try:
-        return lookup(f"GREEK {case} LETTER {name.replace('lambda', 'lamda')}")
-    except KeyError:
-        return "\N{PRIME}" if name == "prime" else name
 
 
 def _thickened(image: hv.Image) -> hv.Image:

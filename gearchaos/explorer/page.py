@@ -19,8 +19,9 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
-from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
+from gearchaos.explorer.charts import diagram, two_parameter_map
 from gearchaos.explorer.motion import SCALES, empty_panel, show
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes

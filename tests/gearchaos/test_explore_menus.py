@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import gearchaos
-from gearchaos.explorer.charts import plain_text
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import VERMILION
