@@ -74,8 +74,10 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     axes.set_xlabel(axis_label(result, result.axis))
     color, label = own.points.get_color(), str(own.points.get_label())
     if not label.startswith("_"):
-        shape = own.points.get_marker(), own.points.get_linestyle()
-        look: dict[str, Any] = {**dict(zip(("marker", "ls"), shape, strict=True)), "ms": 4.0}
+        sample = own.parts.get("line", own.points)
+        shape = sample.get_marker(), sample.get_linestyle()
+        look: dict[str, Any] = dict(zip(("marker", "ls"), shape, strict=True))
+        look |= {"ms": 4.0, "lw": sample.get_linewidth()}
         own.named.insert(0, Line2D([], [], color=color, label=label, **look))
     if own.lanes.diverged.any():
         look = {"marker": "|", "ms": 8.0, "mew": 0.8, "color": VERMILION}

@@ -27,6 +27,15 @@ GREY = "#595959"
 OVERLAID = ((BLACK, "."), (BLUE, "^"), (GREEN, "v"), (PURPLE, "s"), (ORANGE, "D"))
 """Colours and markers of several results in the same axes."""
 
+DASHES: dict[str, Any] = {
+    ".": "-",
+    "^": (0, (4, 2)),
+    "v": (0, (1.5, 1.5)),
+    "s": (0, (6, 2, 1.5, 2)),
+    "D": (0, (8, 2)),
+}
+"""Dashes of the lines of several results, by the marker of their dots; all have one width."""
+
 _STYLE = mpl.rc_params_from_file(
     Path(__file__).with_name("journal.mplstyle"), use_default_template=False
 )
