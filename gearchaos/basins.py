@@ -20,6 +20,7 @@ from gearchaos.options import (
     Overwrite,
     Place,
     Threads,
+    Units,
     one_format,
     placed_coordinates,
 )
@@ -56,6 +57,7 @@ class BasinsOptions(NamedTuple):
     ] = ()
     json: Annotated[bool, Option("print JSON, with sections and means of all variables")] = False
     csv: AsCsv = False
+    units: Units = None
     overwrite: Overwrite = False
     threads: Threads = None
 
@@ -66,6 +68,7 @@ def _basins(options: BasinsOptions) -> None:
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.outputs.names import REPEATS, START
+    from gearchaos.results.reading.basin_units import physical_basins
     from gearchaos.results.reading.listed import list_basins
     from gearchaos.results.reading.overview import json_values, slice_lines
     from gearchaos.results.reading.result import open_result
@@ -81,6 +84,8 @@ def _basins(options: BasinsOptions) -> None:
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})
     with compiling():
         found = find_basins(part, options.result, options.threads)
+    if options.units == "physical":
+        found = physical_basins(found)
     where = slice_facts(whole, part)
     if options.json:
         print(json.dumps(json_values(_facts(found, where)), indent=1))
@@ -108,6 +113,7 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
         "starts": found.numbers.shape[1],
         "basins": basins,
         "entropy": found.entropy,
+        "units": dict(found.units),
     }
 
 
@@ -119,6 +125,8 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     unit = "" if unit == "1" else f" [{unit}]"
     yield f"basins over {found.parameter}{unit}, {found.numbers.shape[1]} starts at each value"
     yield from where
+    if found.units:
+        yield f"exponents in {found.units.get('lyapunov_exponent', '1')}"
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
     yield f"{head}  {'share':>7}  95 % confidence"
     for one in found.basins:
@@ -131,7 +139,11 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
         yield f"{value:10.6g}  basin entropy {basin:.4f}, of the boundary alone {boundary:.4f}"
     for one in found.basins if found.values.size == 1 else ():
         facts = [f"{name} {kind}" for name, kind in one.contact.items()]
-        facts += [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
+        facts += [
+            f"{name} {mean:.4g} {found.units.get(name, '').removeprefix('1')}".rstrip()
+            for name, mean in one.means.items()
+            if not math.isnan(mean)
+        ]
         if one.number > 0 and facts:
             text = f"{one.number}: {', '.join(facts)}"
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")

@@ -14,13 +14,14 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, in_words, legend_title
+from gearchaos.figures.labels import axis_label, in_words, label_of, legend_title
 from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
 from gearchaos.models.catalogues import scale_of, subject_of
 from gearchaos.outputs.names import REPEATS
+from gearchaos.outputs.variable import Variable
 from gearchaos.results.reading.ensembles import Basin, Basins, Counted, in_order, motion_shares
 from gearchaos.results.reading.result import Result
 
@@ -215,7 +216,12 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
         face, size, edge = (_look(one)["facecolor"], 5.0, 0.6) if one.period else (BLACK, 1.0, 0.0)
         points = one.section[:MOST_POINTS, columns].T
         axes.plot(*points, "o", ms=size, mfc=face, mec=BLACK, mew=edge)
-    axes.set(xlim=ends[0][[0, -1]], ylim=ends[1][[0, -1]], xlabel=_label(x), ylabel=_label(y))
+    axes.set(
+        xlim=ends[0][[0, -1]],
+        ylim=ends[1][[0, -1]],
+        xlabel=_label(found, x),
+        ylabel=_label(found, y),
+    )
     return image
 
 
@@ -300,9 +306,12 @@ def _look(one: Basin) -> dict[str, Any]:
     return {"facecolor": COLORS[(one.number - 1) % len(COLORS)], "edgecolor": "0.55"}
 
 
-def _label(state: str) -> str:
-    subject = subject_of(state)
-    return f"{subject.long_name.capitalize()}, {subject.symbol} ({scale_of(state).stands_for})"
+def _label(found: Basins, state: str) -> str:
+    """Return the label of a state, in the units of the basins."""
+    subject, scale = subject_of(state), scale_of(state)
+    words = subject.long_name, subject.symbol
+    units = found.units.get(state, "1")
+    return label_of(Variable(state, (), "float64", units, *words, scale=scale))
 
 
 def _in_words(one: Basin) -> str:

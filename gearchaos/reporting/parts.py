@@ -22,6 +22,7 @@ from gearchaos.figures.page import Page
 from gearchaos.figures.response import is_response
 from gearchaos.outputs.names import DIRECTION, LABELS, REPEATS, START, STATUS, coordinate_text
 from gearchaos.reporting import markup
+from gearchaos.results.reading.basin_units import physical_basins
 from gearchaos.results.reading.ensembles import Basins, motion_shares
 from gearchaos.results.reading.jumps import apart, jumps
 from gearchaos.results.reading.listed import (
@@ -75,6 +76,8 @@ def parts_of(computed: Result, shown: Result, name: str) -> Parts:
         at = dict(zip(axes, values, strict=True))
         one = shown.sel(None, **at)
         found = _basins(computed.sel(None, **at), name)
+        if found is not None and shown is not computed:
+            found = physical_basins(found)
         where = f", {one.where}" if one.fixed else ""
         parts.figures.extend(_drawn(_pages(one, found), where))
         for caption, listed in _tables(one, found):
