@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
     from gearchaos.engine.refinement import Boundary
     from gearchaos.results.reading.jumps import Apart, Crisis, Jump
+    from gearchaos.results.reading.opinions import Opinions
     from gearchaos.results.reading.result import Result
     from gearchaos.results.reading.stage_table import Stage
 
@@ -64,6 +65,10 @@ class StagesOptions(NamedTuple):
             high=1000,
         ),
     ] = None
+    zero_one: Annotated[
+        bool,
+        Option("also apply the 0-1 test for chaos to the sections, and compare it with labels"),
+    ] = False
     json: Annotated[bool, Option("print JSON instead of a table")] = False
     csv: AsCsv = False
     threads: Threads = None
@@ -74,7 +79,8 @@ class Listing(NamedTuple):
 
     ``result``: the sweep along this axis, with any pairs and starts; ``where``: values of the fixed
     axes; ``apart``: intervals where the two directions differ, None for a sweep in one direction;
-    ``boundaries`` and ``survival``: None if they were not requested.
+    ``boundaries``, ``survival`` and ``opinions``, the values of the 0-1 test: None if they were not
+    requested.
     """
 
     result: "Result"
@@ -85,6 +91,7 @@ class Listing(NamedTuple):
     jumps: "list[Jump]"
     crises: "list[Crisis]"
     survival: "Survival | None"
+    opinions: "Opinions | None"
 
 
 def _stages(options: StagesOptions) -> None:
@@ -124,6 +131,7 @@ def _listing(
     """
     from gearchaos.outputs.names import DIRECTION, REPEATS
     from gearchaos.results.reading.jumps import apart, crises, jumps
+    from gearchaos.results.reading.opinions import second_opinions
     from gearchaos.results.reading.stage_table import (
         labelled_lanes,
         one_axis,
@@ -148,6 +156,7 @@ def _listing(
         [] if several else jumps(result),
         [] if several else crises(result),
         outlasting,
+        second_opinions(result, options.result) if options.zero_one else None,
     )
 
 
@@ -165,6 +174,7 @@ def _facts(listing: Listing) -> dict[str, Any]:
         "jumps": listing.jumps,
         "crises": listing.crises,
         "survival": listing.survival,
+        **({} if listing.opinions is None else {"zero_one": listing.opinions.facts()}),
     }
 
 
@@ -188,6 +198,7 @@ def _text(listing: Listing) -> str:
     below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed, unit)]
     below += directions_apart(listing.apart or ())
     below += [listing.survival.text] if listing.survival else []
+    below += listing.opinions.lines() if listing.opinions else []
     axis = f"{result.axis} [{unit.strip()}]" if unit else result.axis
     first = table(axis, listing.stages, [*filter(None, head)])
     parts = map("\n".join, (first, below, boundary_list(listing.boundaries or ())))

@@ -20,6 +20,7 @@ from gearchaos.outputs.listing import Details, for_each
 from gearchaos.outputs.variable import Variable
 from gearchaos.records.contact import CONTACT_STATES, contact_summary
 from gearchaos.records.difference import difference
+from gearchaos.records.dimension import kaplan_yorke
 from gearchaos.records.label import MOTION_MEANINGS
 
 
@@ -37,6 +38,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
         catalogue.MOTION_PART: outputs.motion,
         catalogue.RECORD_PART: outputs.motion and outputs.lyapunov,
         catalogue.EXPONENTS_PART: outputs.exponents,
+        catalogue.DIMENSION_PART: outputs.exponents,
         catalogue.CROSSINGS_PART: run.splits_steps,
         catalogue.CONTACT_PART: run.elements if touched else (),
         **(for_each(model.load_parts, run.elements) if run.plan.loads else {}),
@@ -105,6 +107,9 @@ def arrays_of(
             spectrum = spectrum.given(largest.of_orbit)
         arrays["lyapunov_exponents"] = spectrum.values
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
+        dimension, error = kaplan_yorke(spectrum.values, spectrum.standard_errors)
+        arrays["kaplan_yorke_dimension"] = dimension
+        arrays["kaplan_yorke_dimension_standard_error"] = error
         arrays["lyapunov_sum"] = sum_of_exponents(system, contact_shares(outcome, plan))
     if run.config.integration.error_check > 0.0:
         arrays |= _check(run, lanes, start, outcome, labelled)
