@@ -25,6 +25,7 @@ from gearchaos.figures.style import (
     styled,
 )
 from gearchaos.figures.ticks import light
+from gearchaos.figures.units import explained_units
 from gearchaos.interrupts import check
 from gearchaos.results.files.atomic_file import check_output, replacing
 from gearchaos.version import software_version
@@ -78,7 +79,23 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         canvas: Any = FigureCanvasAgg(figure)
         canvas.get_renderer().mathtext_parser = FORMULAE
         yield figure
+        _explain(figure)
         _lay_out(figure, layout)
+
+
+def _explain(figure: Page) -> None:
+    """Explain the units of a page in the title of its legend, or else in its footnote."""
+    words = explained_units(figure)
+    if not words:
+        return
+    if figure.legends:
+        legend = figure.legends[-1]
+        before = legend.get_title().get_text()
+        # A legend without a title has the text "None".
+        lines = [before, words] if before not in ("", "None") else [words]
+        legend.set_title("\n".join(lines))
+    else:
+        footnote(figure, "\n".join(filter(None, (figure.get_supxlabel(), words))))
 
 
 @contextmanager
