@@ -10,6 +10,7 @@ from holoviews.operation.downsample import downsample1d
 from matplotlib.colors import ListedColormap, to_hex
 from matplotlib.figure import Figure
 
+from gearchaos.arrays import Array
 from gearchaos.explorer.shades import COLOURS
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures.labels import axis_label
@@ -31,6 +32,9 @@ FILLED = 0.05
 
 NO_VALUES = "no lane has a value of this variable"
 """Title of a diagram without points."""
+
+WIDEST_GAP = 6
+"""Widest gap between lanes, in pixels, that is filled by widening their dots."""
 
 VALUE = "z"
 """Name that HoloViews gives to a variable over two axes."""
@@ -94,10 +98,21 @@ def _thickened(image: hv.Image) -> hv.Image:
         wide = np.pad(thick, 1)
         tall = np.maximum.reduce([wide[:-2], wide[1:-1], wide[2:]])
         thick = np.maximum.reduce([tall[:, :-2], tall[:, 1:-1], tall[:, 2:]])
+    thick = _closed(thick)
     # float32 halves the size of the picture that is sent to the browser.
     shown = np.where(thick, thick, np.nan).astype(np.float32)
     data = image.data.assign({count.name: (counts.dims, shown)})
     return image.clone(data, vdims=[count.clone(nodata=None)])
+
+
+def _closed(counts: Array) -> Array:
+    """Widen points along x so that a continuous branch has no gaps between its lanes."""
+    filled = np.flatnonzero(counts.any(axis=0))
+    gap = int(np.diff(filled).max(initial=1)) if filled.size * WIDEST_GAP > counts.shape[1] else 1
+    reach = min(gap, WIDEST_GAP) - 1
+    wide = np.pad(counts, ((0, 0), (reach - reach // 2, reach // 2)))
+    shifted = [wide[:, at : at + counts.shape[1]] for at in range(reach + 1)]
+    return np.asarray(np.maximum.reduce(shifted))
 
 
 def _dimensions(result: Result, *names: str) -> list[Any]:

@@ -27,7 +27,7 @@ def stage_boxes(
     boxes, kinds = [], {}
     for one in shade_stages(axes, result, legend=False):
         colour, left = to_hex(one.get_facecolor()), one.get_x()
-        look = {"fill_color": colour, "fill_alpha": 1.0, "line_alpha": 0.0, "level": "image"}
+        look = {"fill_color": colour, "fill_alpha": 1.0, "line_alpha": 0.0, "level": "underlay"}
         boxes.append(BoxAnnotation(left=left, right=left + one.get_width(), **look))
         kinds[str(one.get_label())] = colour
     return boxes, kinds
