@@ -238,8 +238,7 @@ class ExplorerPage:
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
         hv.streams.RangeXY(source=charts[0]).add_subscriber(self._zoom)
-        # One pane for each chart: the common toolbar of a layout forgets which tools are active.
-        self._charts[:] = [pn.pane.HoloViews(chart, **WIDE) for chart in charts]
+        self._charts[:] = [pn.pane.HoloViews(hv.Layout(charts).cols(1), **WIDE)]
         swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
         texts = (swatch.format(colour, escape(name)) for name, colour in kinds.items())
         self._kinds.object = "".join(texts)

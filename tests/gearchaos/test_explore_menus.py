@@ -39,9 +39,9 @@ AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machi
 MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
     [...menu.options].map(one => [one.value, one.textContent])])"""
 """Title of every menu, and value and text of its entries."""
-LABEL = """() => [...Bokeh.documents[0]._all_models.values()]
-    .filter(one => one.type == "Figure")[0].left[0].axis_label"""
-"""Label at the vertical axis of the first chart."""
+LABELS = """[...Bokeh.documents[0]._all_models.values()]
+    .filter(one => one.type == "Figure").map(one => one.left[0].axis_label)"""
+"""Labels at the vertical axes of all charts that the page has drawn."""
 FAULT = f"b[style*='{VERMILION}']"
 
 
@@ -114,6 +114,7 @@ def entries_drawn(page, result: gearchaos.Result) -> list[str]:
                 shown = text if len(swept_axes(result)) == 1 else result.axes[0]
                 label = " ".join(plain_text(axis_label(result, shown)).split())
                 page.wait_for_function(
-                    f"label => ({LABEL})().split(/\\s+/).join(' ') == label", arg=label
+                    f"label => {LABELS}.some(one => one.split(/\\s+/).join(' ') == label)",
+                    arg=label,
                 )
     return drawn
