@@ -8,7 +8,7 @@ from gearchaos.models.gear_pair.derivation import FREQUENCY, LENGTH, SCALES, STI
 _SYMBOLS = {SCALES[name][2].strip("$"): SCALES[name][1] for name in (LENGTH, FREQUENCY, STIFFNESS)}
 _OF_TIME = SCALES[FREQUENCY][2].strip("$")
 EXPLAINED = {**_SYMBOLS, r"\tau": rf"${_OF_TIME} t$"}
-"""What each symbol of a unit stands for."""
+"""Meaning of each symbol of a unit."""
 
 
 def explained_units(figure: Figure) -> str:
