@@ -20,6 +20,7 @@ from gearchaos.options import (
     Overwrite,
     Place,
     Threads,
+    Units,
     one_format,
     placed_coordinates,
 )
@@ -56,6 +57,7 @@ class BasinsOptions(NamedTuple):
     ] = ()
     json: Annotated[bool, Option("print JSON, with sections and means of all variables")] = False
     csv: AsCsv = False
+    units: Units = None
     overwrite: Overwrite = False
     threads: Threads = None
 
@@ -66,9 +68,12 @@ def _basins(options: BasinsOptions) -> None:
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.outputs.names import REPEATS, START
+    from gearchaos.results.reading.basin_units import physical_basins
+    from gearchaos.results.reading.listed import list_basins
     from gearchaos.results.reading.overview import json_values, slice_lines
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
+    from gearchaos.results.reading.tables import csv_text
 
     one_format(options.json, options.csv)
     whole = open_result(options.result)
@@ -79,11 +84,13 @@ def _basins(options: BasinsOptions) -> None:
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})
     with compiling():
         found = find_basins(part, options.result, options.threads)
+    if options.units == "physical":
+        found = physical_basins(found)
     where = slice_facts(whole, part)
     if options.json:
         print(json.dumps(json_values(_facts(found, where)), indent=1))
     elif options.csv:
-        print(_csv(found))
+        print(csv_text(*list_basins(found)))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
@@ -92,6 +99,8 @@ def _basins(options: BasinsOptions) -> None:
 
 def _facts(found: "Basins", where: Any) -> dict[str, Any]:
     """Return what --json prints."""
+    from gearchaos.results.reading.listed import unit_of_axis
+
     basins = [one._asdict() for one in found.basins]
     for one in basins:
         # The section of a motion without a period would have a thousand points.
@@ -99,45 +108,25 @@ def _facts(found: "Basins", where: Any) -> dict[str, Any]:
         one["number"] = one["number"] if one["number"] > 0 else None
     return {
         "parameter": found.parameter,
-        "unit": _unit(found),
+        "unit": unit_of_axis(found.result, found.parameter),
         "slice": where,
         "starts": found.numbers.shape[1],
         "basins": basins,
         "entropy": found.entropy,
+        "units": dict(found.units),
     }
-
-
-def _unit(found: "Basins") -> str:
-    """Return the unit of the parameter as plain text."""
-    from gearchaos.results.reading.tables import unit_text
-
-    result = found.result
-    known = result.variables | result.fixed_axes
-    return unit_text(known[found.parameter]) if found.parameter in known else "1"
-
-
-def _csv(found: "Basins") -> str:
-    """Return what --csv prints: a row for each basin."""
-    from gearchaos.results.reading.tables import csv_text
-
-    headings = [f"{found.parameter} [{_unit(found)}]", "number", "motion", "period [1]"]
-    headings += ["multiplier [1]", "exponent [per unit of tau]", "starts [1]", "share [1]"]
-    headings += ["share, 95 % from [1]", "share, 95 % to [1]"]
-    rows = (
-        (
-            *(one.value, one.number if one.number > 0 else "", one.motion, one.period),
-            *(one.multiplier, one.exponent, one.starts, one.share, *one.share_95_percent),
-        )
-        for one in found.basins
-    )
-    return csv_text(headings, rows)
 
 
 def table(found: "Basins", where: list[str]) -> Iterator[str]:
     """Return the basins as lines of a table, each of at most 80 characters."""
-    unit = "" if _unit(found) == "1" else f" [{_unit(found)}]"
+    from gearchaos.results.reading.listed import unit_of_axis
+
+    unit = unit_of_axis(found.result, found.parameter)
+    unit = "" if unit == "1" else f" [{unit}]"
     yield f"basins over {found.parameter}{unit}, {found.numbers.shape[1]} starts at each value"
     yield from where
+    if found.units:
+        yield f"exponents in {found.units.get('lyapunov_exponent', '1')}"
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
     yield f"{head}  {'share':>7}  95 % confidence"
     for one in found.basins:
@@ -150,7 +139,11 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
         yield f"{value:10.6g}  basin entropy {basin:.4f}, of the boundary alone {boundary:.4f}"
     for one in found.basins if found.values.size == 1 else ():
         facts = [f"{name} {kind}" for name, kind in one.contact.items()]
-        facts += [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
+        facts += [
+            f"{name} {mean:.4g} {found.units.get(name, '').removeprefix('1')}".rstrip()
+            for name, mean in one.means.items()
+            if not math.isnan(mean)
+        ]
         if one.number > 0 and facts:
             text = f"{one.number}: {', '.join(facts)}"
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")

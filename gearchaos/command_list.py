@@ -3,6 +3,7 @@
 COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
     "plot": "draw a result file",
+    "report": "write a page with figures, tables and a glossary of a result",
     "explore": "open a local page to explore a result",
     "stages": "list the stages of a sweep and refine their boundaries",
     "basins": "find the attractors of a sweep from many starts, and their basins",
@@ -23,5 +24,5 @@ COMMANDS = {
 }
 """The command NAME is the object ``main`` of the module ``gearchaos.NAME``.
 
-Listed here, because importing 19 modules would slow down every start.
+Listed here, because importing 20 modules would slow down every start.
 """

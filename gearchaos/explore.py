@@ -3,19 +3,25 @@
 Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
 address in the browser is a link to the current view.
 
+--save writes an interactive page instead: diagram with stages and exponents, or map, of at most 5
+MB, for readers without the program. It has no motions of lanes.
+
 Needs more packages: pip install gearchaos[explore].
 """
 
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos import plot
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError, FileError
-from gearchaos.options import Option, ResultFile
+from gearchaos.options import Option, Overwrite, Place, ResultFile, Units, placed_coordinates
 from gearchaos.progress import say
+
+if TYPE_CHECKING:
+    from gearchaos.results.reading.result import Result
 
 PORTS = 20
 """Most ports that are tried, from the wanted one on."""
@@ -40,6 +46,18 @@ class ExploreOptions(NamedTuple):
         ),
     ] = 5006
     no_browser: Annotated[bool, Option("print the address, but do not open a browser")] = False
+    save: Annotated[
+        str | None,
+        Option(
+            "write an interactive page to this file, and do not serve one", "PAGE.html", file=True
+        ),
+    ] = None
+    at: Annotated[
+        tuple[Place, ...],
+        Option("with --save: use the nearest value of this axis; may be repeated", "NAME=VALUE"),
+    ] = ()
+    units: Units = None
+    overwrite: Overwrite = False
 
 
 def _explore(options: ExploreOptions) -> None:
@@ -55,6 +73,9 @@ def _explore(options: ExploreOptions) -> None:
         raise ConfigurationError(
             f"{options.result}: is a response; python -m gearchaos.plot draws it"
         )
+    if options.save is not None:
+        _save(result, options)
+        return
     # Must be imported before datashader uses Numba, which settles the processor for all code.
     import gearchaos_kernels  # noqa: F401
 
@@ -83,6 +104,28 @@ def _explore(options: ExploreOptions) -> None:
     if not options.no_browser:
         webbrowser.open(address)
     server.io_loop.start()
+
+
+def _save(result: "Result", options: ExploreOptions) -> None:
+    """Write the page of --save.
+
+    Panel stays out: bokeh would add its scripts to the page, by name and not as text.
+    """
+    from gearchaos.results.reading.tables import needed
+
+    needed("bokeh", "explore")
+    from gearchaos.explorer.static import static_page
+    from gearchaos.finishing import output_of
+    from gearchaos.results.files.atomic_file import check_output, replacing
+    from gearchaos.results.reading.physical_units import in_units
+
+    output = output_of(options.save, options.result)
+    check_output(output, options.overwrite)
+    part = result.sel("within", **placed_coordinates(options.at, result.axes, result.axis))
+    content = static_page(in_units(part, options.units, physical=False))
+    with replacing(output, overwrite=options.overwrite) as partial:
+        partial.write_text(content, encoding="utf-8")
+    print(output, flush=True)
 
 
 def _free_port(host: str, wanted: int) -> int:

@@ -11,6 +11,9 @@ variable with one number per lane, or an amplitude such as amplitude_transmissio
 it is any variable with one number per lane (default: motion, exponent and contact). For a response
 it is a coordinate (default: delta_5) or another variable over time, such as mesh_force_tangential.
 
+Settings of a matplotlibrc file that differ from the defaults of matplotlib replace those of the
+style. Texts stay texts in SVG, and fonts are embedded in PDF.
+
 --stages omits stages that are narrower than a 150th of the axis: they are merged into the
 surrounding stage, or into a stage of several motions.
 
@@ -110,6 +113,13 @@ class PlotOptions(NamedTuple):
         ),
     ] = ()
     stages: Annotated[bool, Option("shade the stages behind the diagram of a sweep")] = False
+    lines: Annotated[
+        bool,
+        Option(
+            "draw variables with one number per lane as lines, broken at jumps and where the "
+            "motion changes; sections stay dots"
+        ),
+    ] = False
     shares: Annotated[
         bool,
         Option(
@@ -186,6 +196,7 @@ def _plot(options: PlotOptions) -> None:
     if any(responses):
         flags = {
             "--stages": options.stages,
+            "--lines": options.lines,
             "--shares": options.shares,
             "--control": options.control,
             "--mark": options.mark,
@@ -243,6 +254,7 @@ def _plot_branches(options: PlotOptions) -> None:
 
     flags: dict[str, object] = {
         "--stages": options.stages,
+        "--lines": options.lines,
         "--shares": options.shares,
         "--mark": options.mark,
         "--at": options.at,
@@ -274,6 +286,7 @@ def _plot_boundaries(options: PlotOptions) -> None:
     flags: dict[str, object] = {
         "--variable": options.variable,
         "--stages": options.stages,
+        "--lines": options.lines,
         "--shares": options.shares,
         "--mark": options.mark,
         "--at": options.at,
@@ -402,6 +415,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
         flags: dict[str, object] = {
             "--variable": options.variable,
             "--stages": options.stages,
+            "--lines": options.lines,
             "--branches": options.branches,
             "--boundaries": options.boundaries,
         }
@@ -411,7 +425,8 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
         page = f"a map; --at {maps[0][0]}=VALUE makes a diagram of it"
-        _draws_alone(page, options, {"--stages": options.stages, "--branches": options.branches})
+        flags = {"--stages": options.stages, "--lines": options.lines}
+        _draws_alone(page, options, flags | {"--branches": options.branches})
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         name += "_with_boundaries" if options.boundaries else ""
         return [(name, _with_boundaries(results[0], options, draw))]
@@ -421,7 +436,9 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
             "is a diagram of one; leave it out"
         )
     name += "_stages" if options.stages else ""
-    shown: dict[str, Any] = {"stages": options.stages, "labels": _labels(results, options)}
+    name += "_lines" if options.lines else ""
+    shown: dict[str, Any] = {"stages": options.stages, "lines": options.lines}
+    shown["labels"] = _labels(results, options)
     if marked:
         shown["marked"] = (in_words(results[0], marked), [*marked.values()])
     draw = partial(bifurcation_page, results, options.variable, **shown, **size)

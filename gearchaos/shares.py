@@ -41,6 +41,7 @@ class SharesOptions(NamedTuple):
 
 def _shares(options: SharesOptions) -> None:
     from gearchaos.results.reading.ensembles import motion_shares
+    from gearchaos.results.reading.listed import list_shares
     from gearchaos.results.reading.overview import json_values, slice_lines
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
@@ -53,60 +54,26 @@ def _shares(options: SharesOptions) -> None:
     if options.json:
         print(json.dumps(json_values(_facts(result, counted, where)), indent=1))
     elif options.csv:
-        rows = _rows(result, counted)
-        print(csv_text([*rows[0]], ([*row.values()] for row in rows)))
+        print(csv_text(*list_shares(result, counted)))
     else:
         print("\n".join([*_table(result, counted, slice_lines(where))]))
 
 
-def _counted(counted: "Counted | None", at: int) -> tuple[float, float, float]:
-    """Return share, lower and upper bound of one value; NaN where nothing was counted."""
-    if counted is None:
-        return math.nan, math.nan, math.nan
-    low, high = counted.intervals[at].tolist()
-    return float(counted.shares[at]), low, high
-
-
-def _rows(result: "Result", counted: "MotionShares") -> list[dict[str, Any]]:
-    """Return a row for each swept value: heading with unit, and number."""
-    from gearchaos.results.reading.tables import unit_text
-
-    rows = []
-    for at, value in enumerate(counted.values.tolist()):
-        row: dict[str, Any] = {f"{result.axis} [{unit_text(result.variables[result.axis])}]": value}
-        row["lanes [1]"] = int(counted.other.lanes[at])
-        share, low, high = _counted(counted.other, at)
-        # The share of a complement has the complements of the bounds.
-        smooth = 1.0 - share, 1.0 - high, 1.0 - low
-        kept = tuple(1.0 - bound for bound in _counted(counted.apart, at))
-        for words, found in {
-            "period 1": smooth,
-            "other motion": (share, low, high),
-            "keeps contact": (kept[0], kept[2], kept[1]),
-        }.items():
-            names = (f"{words} [1]", f"{words}, 95 % from [1]", f"{words}, 95 % to [1]")
-            row |= dict(zip(names, found, strict=True))
-        every = dict(zip(counted.motions, counted.counts[at].tolist(), strict=True))
-        row |= {f"lanes with {motion} [1]": lanes for motion, lanes in every.items()}
-        rows.append(row)
-    return rows
-
-
 def _facts(result: "Result", counted: "MotionShares", where: "dict[str, float]") -> dict[str, Any]:
     """Return what --json prints."""
-    from gearchaos.results.reading.tables import unit_text
+    from gearchaos.results.reading.listed import share_and_interval, unit_of_axis
 
     values = []
     for at, value in enumerate(counted.values.tolist()):
         facts: dict[str, Any] = {"value": value, "lanes": int(counted.other.lanes[at])}
         for name, found in {"not_period_1": counted.other, "loses_contact": counted.apart}.items():
-            share, low, high = _counted(found, at)
+            share, low, high = share_and_interval(found, at)
             facts[name] = {"share": share, "share_95_percent": [low, high]}
         every = zip(counted.motions, counted.counts[at].tolist(), strict=True)
         values.append({**facts, "lanes_by_motion": dict(every)})
     return {
         "parameter": result.axis,
-        "unit": unit_text(result.variables[result.axis]),
+        "unit": unit_of_axis(result, result.axis),
         "slice": where,
         "values": values,
     }
@@ -114,9 +81,9 @@ def _facts(result: "Result", counted: "MotionShares", where: "dict[str, float]")
 
 def _table(result: "Result", counted: "MotionShares", where: list[str]) -> Iterator[str]:
     """Return the shares as lines of a table, each of at most 80 characters."""
-    from gearchaos.results.reading.tables import unit_text
+    from gearchaos.results.reading.listed import unit_of_axis
 
-    unit = unit_text(result.variables[result.axis])
+    unit = unit_of_axis(result, result.axis)
     yield f"shares over {result.axis}" + (f" [{unit}]" if unit != "1" else "")
     yield from where
     yield "period 1: the motion repeats with the excitation; in brackets: 95 % confidence"
@@ -129,7 +96,9 @@ def _table(result: "Result", counted: "MotionShares", where: list[str]) -> Itera
 
 def _percent(whole: float, counted: "Counted | None", at: int) -> str:
     """Word the share of lanes that do not have a property, with its interval."""
-    share, low, high = (whole - bound for bound in _counted(counted, at))
+    from gearchaos.results.reading.listed import share_and_interval
+
+    share, low, high = (whole - bound for bound in share_and_interval(counted, at))
     return "" if math.isnan(share) else f"{share:.1%} ({high:.1%} to {low:.1%})"
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
     from gearchaos.engine.refinement import Boundary
     from gearchaos.results.reading.jumps import Apart, Crisis, Jump
+    from gearchaos.results.reading.opinions import Opinions
     from gearchaos.results.reading.result import Result
     from gearchaos.results.reading.stage_table import Stage
 
@@ -64,6 +65,10 @@ class StagesOptions(NamedTuple):
             high=1000,
         ),
     ] = None
+    zero_one: Annotated[
+        bool,
+        Option("also apply the 0-1 test for chaos to the sections, and compare it with labels"),
+    ] = False
     json: Annotated[bool, Option("print JSON instead of a table")] = False
     csv: AsCsv = False
     threads: Threads = None
@@ -74,7 +79,8 @@ class Listing(NamedTuple):
 
     ``result``: the sweep along this axis, with any pairs and starts; ``where``: values of the fixed
     axes; ``apart``: intervals where the two directions differ, None for a sweep in one direction;
-    ``boundaries`` and ``survival``: None if they were not requested.
+    ``boundaries``, ``survival`` and ``opinions``, the values of the 0-1 test: None if they were not
+    requested.
     """
 
     result: "Result"
@@ -85,13 +91,16 @@ class Listing(NamedTuple):
     jumps: "list[Jump]"
     crises: "list[Crisis]"
     survival: "Survival | None"
+    opinions: "Opinions | None"
 
 
 def _stages(options: StagesOptions) -> None:
     from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
+    from gearchaos.results.reading.listed import list_stages
     from gearchaos.results.reading.overview import json_values
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import one_axis, require_labels
+    from gearchaos.results.reading.tables import csv_text
 
     one_format(options.json, options.csv)
     whole = open_result(options.result)
@@ -107,7 +116,7 @@ def _stages(options: StagesOptions) -> None:
     if options.json:
         print(json.dumps(json_values(_facts(listing)), indent=1))
     elif options.csv:
-        print(_csv(listing))
+        print(csv_text(*list_stages(listing.result, listing.stages)))
     else:
         print(_text(listing))
 
@@ -122,6 +131,7 @@ def _listing(
     """
     from gearchaos.outputs.names import DIRECTION, REPEATS
     from gearchaos.results.reading.jumps import apart, crises, jumps
+    from gearchaos.results.reading.opinions import second_opinions
     from gearchaos.results.reading.stage_table import (
         labelled_lanes,
         one_axis,
@@ -146,14 +156,17 @@ def _listing(
         [] if several else jumps(result),
         [] if several else crises(result),
         outlasting,
+        second_opinions(result, options.result) if options.zero_one else None,
     )
 
 
 def _facts(listing: Listing) -> dict[str, Any]:
     """Return what --json prints."""
+    from gearchaos.results.reading.listed import unit_of_axis
+
     return {
         "parameter": listing.result.axis,
-        "unit": _unit(listing.result, listing.result.axis),
+        "unit": unit_of_axis(listing.result, listing.result.axis),
         "slice": listing.where,
         "stages": listing.stages,
         **({} if listing.apart is None else {"directions_apart": listing.apart}),
@@ -161,40 +174,15 @@ def _facts(listing: Listing) -> dict[str, Any]:
         "jumps": listing.jumps,
         "crises": listing.crises,
         "survival": listing.survival,
+        **({} if listing.opinions is None else {"zero_one": listing.opinions.facts()}),
     }
-
-
-def _unit(result: "Result", name: str) -> str:
-    """Return the unit of a variable as plain text."""
-    from gearchaos.results.reading.tables import unit_text
-
-    return unit_text(result.variables[name])
-
-
-def _csv(listing: Listing) -> str:
-    """Return what --csv prints: a row for each stage."""
-    from gearchaos.outputs.names import LARGEST_EXPONENT
-    from gearchaos.results.reading.tables import csv_text
-
-    result = listing.result
-    unit = _unit(result, result.axis)
-    rate = _unit(result, LARGEST_EXPONENT) if LARGEST_EXPONENT in result else "1"
-    headings = [f"from [{unit}]", f"to [{unit}]", "motion", "period [1]", "lanes [1]"]
-    headings += [f"lowest exponent [{rate}]", f"highest exponent [{rate}]", "most bands [1]"]
-    rows = (
-        (
-            *(one.start, one.end, one.label, one.period, one.lanes),
-            *(one.lowest_exponent, one.highest_exponent, max(one.bands, default=0)),
-        )
-        for one in listing.stages
-    )
-    return csv_text(headings, rows)
 
 
 def _text(listing: Listing) -> str:
     """Return the table of the stages, then remarks, then boundaries."""
     from gearchaos.outputs.names import RECORD, REPEATS
     from gearchaos.results.reading.excitation import excitation_of
+    from gearchaos.results.reading.listed import unit_of_axis
     from gearchaos.results.reading.overview import slice_lines
 
     result = listing.result
@@ -205,11 +193,12 @@ def _text(listing: Listing) -> str:
     ]
     head += [*slice_lines(listing.where), excitation_of(result.metadata).in_words]
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    unit = _unit(result, result.axis)
+    unit = unit_of_axis(result, result.axis)
     unit = "" if unit == "1" else f" {unit}"
     below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed, unit)]
     below += directions_apart(listing.apart or ())
     below += [listing.survival.text] if listing.survival else []
+    below += listing.opinions.lines() if listing.opinions else []
     axis = f"{result.axis} [{unit.strip()}]" if unit else result.axis
     first = table(axis, listing.stages, [*filter(None, head)])
     parts = map("\n".join, (first, below, boundary_list(listing.boundaries or ())))

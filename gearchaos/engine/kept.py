@@ -22,6 +22,7 @@ from gearchaos.outputs.variable import Variable
 from gearchaos.records.contact import CONTACT_STATES, contact_summary
 from gearchaos.records.control import CAPTURE_MEANINGS
 from gearchaos.records.difference import difference
+from gearchaos.records.dimension import kaplan_yorke
 from gearchaos.records.label import MOTION_MEANINGS
 
 
@@ -39,6 +40,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
         catalogue.MOTION_PART: outputs.motion,
         catalogue.RECORD_PART: outputs.motion and outputs.lyapunov,
         catalogue.EXPONENTS_PART: outputs.exponents,
+        catalogue.DIMENSION_PART: outputs.exponents,
         catalogue.CROSSINGS_PART: run.splits_steps,
         catalogue.CONTACT_PART: run.elements if touched else (),
         **(for_each(model.load_parts, run.elements) if run.plan.loads else {}),
@@ -111,6 +113,9 @@ def arrays_of(
             spectrum = spectrum.given(largest.of_orbit)
         arrays["lyapunov_exponents"] = spectrum.values
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
+        dimension, error = kaplan_yorke(spectrum.values, spectrum.standard_errors)
+        arrays["kaplan_yorke_dimension"] = dimension
+        arrays["kaplan_yorke_dimension_standard_error"] = error
         total = sum_of_exponents(system, contact_shares(outcome, plan))
         # The damping alone does not determine the sum of a closed loop.
         arrays["lyapunov_sum"] = total if system.control is None else np.full_like(total, np.nan)

@@ -1,8 +1,6 @@
 """Diagram, exponent chart and map of a sweep, redrawn at every zoom."""
 
-import re
 from typing import Any
-from unicodedata import lookup
 
 import holoviews as hv
 import numpy as np
@@ -12,6 +10,9 @@ from holoviews.operation.downsample import downsample1d
 from matplotlib.colors import ListedColormap, to_hex
 from matplotlib.figure import Figure
 
+from gearchaos.arrays import Array
+from gearchaos.explorer.shades import COLOURS
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
@@ -26,22 +27,20 @@ Charts = tuple[list[Any], dict[str, str]]
 GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
 """Greys of pixels, from few points to many."""
 
-COLOURS = 256  # Most colours of a map.
-
 FILLED = 0.05
 """Share of filled pixels of a diagram below which dots are enlarged by one pixel."""
 
 NO_VALUES = "no lane has a value of this variable"
 """Title of a diagram without points."""
 
+WIDEST_GAP = 6
+"""Widest gap between lanes, in pixels, that is filled by widening their dots."""
+
 VALUE = "z"
 """Name that HoloViews gives to a variable over two axes."""
 
 DRAWN = 4000
 """Most points of a line; a longer line is reduced to its outline."""
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
 
 
 def diagram(result: Result, variable: str) -> Charts:
@@ -87,22 +86,6 @@ def two_parameter_map(result: Result, variable: str) -> Charts:
     return [chart], {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
 
 
-def plain_text(label: str) -> str:
-    """Write a label in Unicode without formulae, such as δ₅' for ``$\\delta_5'$``."""
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
-    text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
-    text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
-    return re.sub(r"[${}\\]", "", text)
-
-
-def _letter(name: str) -> str:
-    case = "CAPITAL" if name[0].isupper() else "SMALL"
-    try:
-        return lookup(f"GREEK {case} LETTER {name.replace('lambda', 'lamda')}")
-    except KeyError:
-        return "\N{PRIME}" if name == "prime" else name
-
-
 def _thickened(image: hv.Image) -> hv.Image:
     """Enlarge dots by one pixel if there are too few to be visible.
 
@@ -115,10 +98,21 @@ def _thickened(image: hv.Image) -> hv.Image:
         wide = np.pad(thick, 1)
         tall = np.maximum.reduce([wide[:-2], wide[1:-1], wide[2:]])
         thick = np.maximum.reduce([tall[:, :-2], tall[:, 1:-1], tall[:, 2:]])
+    thick = _closed(thick)
     # float32 halves the size of the picture that is sent to the browser.
     shown = np.where(thick, thick, np.nan).astype(np.float32)
     data = image.data.assign({count.name: (counts.dims, shown)})
     return image.clone(data, vdims=[count.clone(nodata=None)])
+
+
+def _closed(counts: Array) -> Array:
+    """Widen points along x so that a continuous branch has no gaps between its lanes."""
+    filled = np.flatnonzero(counts.any(axis=0))
+    gap = int(np.diff(filled).max(initial=1)) if filled.size * WIDEST_GAP > counts.shape[1] else 1
+    reach = min(gap, WIDEST_GAP) - 1
+    wide = np.pad(counts, ((0, 0), (reach - reach // 2, reach // 2)))
+    shifted = [wide[:, at : at + counts.shape[1]] for at in range(reach + 1)]
+    return np.asarray(np.maximum.reduce(shifted))
 
 
 def _dimensions(result: Result, *names: str) -> list[Any]:

@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from gearchaos.explorer.charts import plain_text
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures import response as figures
 from gearchaos.figures.response_page import SHOWN_PERIODS
 from gearchaos.outputs.names import acceleration_of

@@ -1,9 +1,10 @@
 """The page of one result, and its reactions to switches, clicks and links."""
 
+import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from html import escape
+from html import escape, unescape
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,17 +13,19 @@ from typing import Any
 import holoviews as hv
 import numpy as np
 import panel as pn
-from bokeh.models import CrosshairTool, Span
+from bokeh.models import CrosshairTool, Label, Span
 
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
-from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
+from gearchaos.explorer.charts import diagram, two_parameter_map
 from gearchaos.explorer.motion import SCALES, empty_panel, show
+from gearchaos.explorer.shades import stage_boxes
+from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import diagram_variables
-from gearchaos.figures.labels import in_words, unit_of
+from gearchaos.figures.labels import axis_label, in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import forces_of
@@ -40,7 +43,20 @@ from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text
 
 WIDE = {"sizing_mode": "stretch_width"}
-HALF = {"flex": "1 1 560px", "min-width": "0"}  # Side by side where the window is wide enough.
+HINT: Any = {
+    "x": 0,
+    "y": 0,
+    "x_offset": 8,
+    "y_offset": 8,
+    "text_font_size": "11px",
+    "background_fill_color": "white",
+    "background_fill_alpha": 0.85,
+}
+"""Look of the text at the pointer."""
+
+# Side by side where the window is wide enough.
+HALF = {"flex": "1 1 560px", "min-width": "0"}
+QUARTER = {"flex": "1 1 270px", "min-width": "0"}
 
 
 class ExplorerPage:
@@ -58,22 +74,27 @@ class ExplorerPage:
 
     def __init__(self, result: Result, path: str, draw: Callable[[Sequence[str]], None]) -> None:
         self._result, self._path, self._draw, self._shown = result, path, draw, result
-        self._swept = swept_axes(result)[::-1]
+        swept = swept_axes(result)[::-1]
+        # A parameter with one value has no axis to draw over.
+        self._swept = [axis for axis in swept if result[axis].size > 1] or swept[:1]
         self._others = [axis for axis in result.axes if axis not in self._swept]
         recorded = result.metadata.get("recorded_periods")
         self._periods = DEFAULT_PERIODS
         if isinstance(recorded, int) and recorded > 0:
             self._periods = min(DEFAULT_PERIODS, recorded)
-        choices: dict[str, Any] = {"variable": self._variables()}
+        choices: dict[str, Any] = {"variable": _worded(result, self._variables())}
         for axis in self._others:
             choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
-        choices |= {"units": ["dimensionless", "physical"], "motion_from": ["end", "start"]}
+        units = ["dimensionless", "physical"]
+        choices |= {"units": units[::-1] if _is_physical(result) else units}
+        choices |= {"motion_from": ["end", "start"]}
         self._switches = {
-            name: pn.widgets.Select(options=choices[name], **_named(name)) for name in choices
+            name: pn.widgets.Select(options=choices[name], **_named(name, result))
+            for name in choices
         }
         for axis in self._swept:
             given = {"value": float(result[axis][result[axis].size // 2]), "format": "0.[000000]"}
-            self._switches[axis] = pn.widgets.FloatInput(**given, **_named(axis))
+            self._switches[axis] = pn.widgets.FloatInput(**given, **_named(axis, result))
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
         # Every text has its line from the beginning: a new line would move the charts below it.
         texts = (pn.pane.HTML("&nbsp;", **WIDE) for _ in range(5))
@@ -81,6 +102,7 @@ class ExplorerPage:
         self._charts, self._panels = pn.Column(**WIDE), [*map(empty_panel, SCALES)]
         ways = zip(("height", "width"), self._swept, strict=False)
         self._marks = [Span(dimension=way, line_color=VERMILION) for way, _ in ways]
+        self._hint = Label(text="", visible=False, **HINT)
         self._steady = True
         self._fixed: Mapping[str, float] = {}
         self._motion: Result | None = None
@@ -112,13 +134,14 @@ class ExplorerPage:
             for name, kind in files
         ]
         title = escape(str(self._result.metadata.get("title", "")))
+        panels = [pn.Column(one, styles=QUARTER) for one in self._panels]
         return pn.Column(
             pn.pane.HTML(f"<b>{title}</b> {escape(self._path)}", **WIDE),
             pn.FlexBox(*self._switches.values()),
             self._fault,
             pn.FlexBox(
                 pn.Column(self._pointed, self._charts, self._kinds, styles=HALF),
-                pn.Column(self._lane, pn.GridBox(*self._panels, ncols=2, **WIDE), styles=HALF),
+                pn.Column(self._lane, pn.FlexBox(*panels, **WIDE), styles=HALF),
                 **WIDE,
             ),
             pn.FlexBox(*saves),
@@ -156,11 +179,27 @@ class ExplorerPage:
     def _allowed(self, name: str) -> bool:
         """Whether a switch has a valid value; an invalid one from a link becomes the first."""
         choices = getattr(self._switches[name], "values", None)
+        if name in self._swept and self._snapped(name):
+            return False
         if self._value(name) in choices if choices else _is_number(self._value(name)):
             return True
         self._switches[name].value = choices[0] if choices else float(self._result[name][0])
         self._refuse(name)
         return False
+
+    def _snapped(self, name: str) -> bool:
+        """Replace a value outside of the sweep by the nearest one, and say so."""
+        value, there = self._value(name), self._result[name]
+        if not _is_number(value):
+            return False
+        margin = 0.5 * float(np.ptp(there)) / max(1, there.size - 1)
+        if there.min() - margin <= value <= there.max() + margin:
+            return False
+        nearest = float(np.clip(value, there.min(), there.max()))
+        self._switches[name].value = nearest
+        ends = f"{there.min():.6g} to {there.max():.6g}"
+        self._say(f"{name} = {value:.6g}: outside of the sweep, {ends}; {nearest:.6g} is shown")
+        return True
 
     def _refuse(self, name: str) -> None:
         self._refused[name] = ""
@@ -183,14 +222,19 @@ class ExplorerPage:
             return
         line = Span(dimension="height", line_color=GREY)
         zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
+        boxes: list[Any] = []
+        if draw is diagram:
+            boxes, kinds = stage_boxes(self._shown, diagram_lanes(self._shown).limits)
         if ends := self._ends:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
             chart.opts(**({"xlim": tuple(ends[:2])} if ends else {}))
             # The second chart shows exponents, and has a line at zero.
-            lines = self._marks if chart is charts[0] else [zero, *self._marks]
+            lines: list[Any] = [zero, *self._marks]
+            if chart is charts[0]:
+                lines = [*self._marks, *boxes, self._hint]
             chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
-            chart.opts(active_tools=["box_zoom"])
+            chart.opts(active_tools=["box_zoom", "wheel_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
         hv.streams.RangeXY(source=charts[0]).add_subscriber(self._zoom)
@@ -209,7 +253,13 @@ class ExplorerPage:
 
     def _point(self, x: float | None, y: float | None) -> None:
         if at := self._nearest(x, y):
-            self._pointed.object = self._words({axis: self._shown[axis][at[axis]] for axis in at})
+            words = self._words({axis: self._shown[axis][at[axis]] for axis in at})
+            self._pointed.object = words
+            with pn.io.unlocked():
+                text = unescape(re.sub("<[^>]*>", "", words))
+                right = float(x or 0.0) > float(np.mean(self._shown[self._swept[0]][[0, -1]]))
+                side = {"text_align": "right" if right else "left", "x_offset": -8 if right else 8}
+                self._hint.update(x=x, y=y, text=text, visible=True, **side)
 
     def _click(self, x: float | None, y: float | None) -> None:
         if at := self._nearest(x, y):
@@ -305,7 +355,7 @@ class ExplorerPage:
 
     def _say_commands(self) -> None:
         lines = (f"python -m gearchaos.{shlex.join(w)}\n" for w in self._arguments().values())
-        self._commands.object = f"<pre>{escape(''.join(lines))}</pre>"
+        self._commands.object = f"<pre style='white-space: pre-wrap'>{escape(''.join(lines))}</pre>"
 
     def _saved(self, name: str, kind: str) -> BytesIO:
         """Draw a figure as the displayed command does, and return its file."""
@@ -320,15 +370,39 @@ class ExplorerPage:
             return BytesIO(target.read_bytes())
 
 
-def _named(switch: str) -> dict[str, Any]:
+def _named(switch: str, result: Result) -> dict[str, Any]:
     """Return name and width of a switch; some versions of panel cannot change the name later."""
-    return {"name": switch.replace("_", " ").capitalize(), "width": 170}
+    name = switch.replace("_", " ").capitalize()
+    if switch in result.axes:
+        name = plain_text(axis_label(result, switch, 200))
+    # About 7 pixels for each letter of the name.
+    return {"name": name, "width": 320 if switch == "variable" else max(170, 7 * len(name))}
+
+
+def _worded(result: Result, names: Sequence[str]) -> dict[str, str]:
+    """Return names of variables by their labels, with units; equal labels get their names."""
+    labels = [plain_text(axis_label(result, name, 200)) for name in names]
+    several = {label for label in labels if labels.count(label) > 1}
+    pairs = zip(labels, names, strict=True)
+    return {f"{label} [{name}]" if label in several else label: name for label, name in pairs}
+
+
+def _is_physical(result: Result) -> bool:
+    """Whether all variables can be converted to physical units."""
+    few = result.sel(None, **{axis: result[axis][0] for axis in result.axes})
+    try:
+        few.physical()
+    except ConfigurationError:
+        return False
+    return True
 
 
 def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
     """Draw marks into a chart whenever it is redrawn, and keep its frame."""
     # A fixed border: longer tick labels would move the frame and redraw the chart.
     plot.state.min_border_left = 130
+    plot.state.axis.axis_label_text_font_style = "normal"
+    plot.state.toolbar.logo = None
     if marks[0] not in plot.state.center:
         plot.state.center = [*plot.state.center, *marks]
 

@@ -23,10 +23,11 @@ from gearchaos.figures.lanes import (
     outermost,
     portions,
 )
+from gearchaos.figures.lines import draw_line, joined
 from gearchaos.figures.maps import NO_VALUE
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.stages import look_of
-from gearchaos.figures.style import BLACK, GREY, VERMILION
+from gearchaos.figures.style import BLACK, DASHES, GREY, VERMILION
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 from gearchaos.outputs.names import (
     EXPONENT_NUMBER,
@@ -39,6 +40,7 @@ from gearchaos.outputs.names import (
 from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
+LINE_PT = 0.6  # Width of lines.
 DECADES = 5  # Decades of the colour scale, down from the largest amplitude.
 
 
@@ -51,6 +53,7 @@ def bifurcation(
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
+    lines: bool = False,
 ) -> Diagram:
     """Draw the bifurcation diagram of one section variable into axes.
 
@@ -67,11 +70,14 @@ def bifurcation(
         Part of the parameter range to show; None is the end of the sweep.
     color, label, marker : str
         Colour, legend entry and marker of the dots.
+    lines : bool
+        Draw a variable with one number per lane as a line, broken where the label of the motion
+        changes and at jumps. Motions that are not periodic keep their dots, and so do sections.
 
     Returns
     -------
     Diagram
-        What was drawn; its ``points`` are the dots.
+        What was drawn; its ``points`` are the dots, and ``parts`` may hold the ``line``.
 
     Raises
     ------
@@ -95,9 +101,17 @@ def bifurcation(
     rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
     alpha = _opacity(lanes.numbers.size, max(1, rows.shape[1]))
     look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
-    points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
+    dotted, parts = lanes, {}
+    if lines and rows.shape[1] == 1:
+        values = rows[lanes.numbers, 0]
+        join, dash = joined(result, lanes, values), DASHES.get(marker, "-")
+        parts["line"] = draw_line(axes, lanes, values, join, color=color, lw=LINE_PT, ls=dash)
+        beside = np.pad(join, 1)
+        dotted = lanes._replace(diverged=lanes.diverged | beside[1:] | beside[:-1])
+    points = dots(axes, dotted, rows, rasterized=True, alpha=alpha, **look)
     axes.set_ylabel(axis_label(result, variable, line_length=34))
-    return close_panel(axes, result, Diagram(points, lanes, *_extremes(lanes, rows)))
+    own = Diagram(points, lanes, *_extremes(lanes, rows), parts=parts)
+    return close_panel(axes, result, own)
 
 
 def _opacity(lanes: int, points: int) -> float:
@@ -246,8 +260,8 @@ def _draw_exponents(
     band = axes.fill_between(x, joined - reach, joined + reach, **fill)
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
     bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
-    line_style = "none" if shown.several_starts and alone.any() else "-"
-    (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=look["label"])
+    dash = "none" if shown.several_starts and alone.any() else DASHES.get(look["marker"], "-")
+    (line,) = axes.plot(x, exponent, ls=dash, lw=LINE_PT, color=color, label=look["label"])
     rows = result.lanes(LARGEST_EXPONENT)[:, np.newaxis]
     dot = {"markersize": lanes.dot_size(1.0), "color": color, "marker": look["marker"]}
     points = dots(axes, lanes._replace(diverged=~shown.isolated), rows, **dot)

@@ -14,17 +14,30 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, in_words, legend_title
+from gearchaos.figures.labels import axis_label, in_words, label_of, legend_title
 from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
-from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
+from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM, VERMILION
 from gearchaos.models.catalogues import scale_of, subject_of
 from gearchaos.outputs.names import REPEATS
-from gearchaos.results.reading.ensembles import Basin, Basins, Counted, in_order, motion_shares
+from gearchaos.outputs.variable import Variable
+from gearchaos.results.reading.ensembles import (
+    Basin,
+    Basins,
+    Counted,
+    MotionShares,
+    in_order,
+    motion_shares,
+)
 from gearchaos.results.reading.result import Result
 
 Drawn = Artist | Container
+
+NOT_PERIOD_1 = {"fmt": "none", "color": BLACK, "label": "not period 1, 95 % confidence"}
+LEAVES_PERIOD_1 = {"fmt": "o", "color": BLACK, "label": "leaves period 1"}
+LOSES_CONTACT = {"fmt": "^", "color": VERMILION, "label": "loses contact"}
+"""Looks of shares with confidence intervals."""
 
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
 """Colours of attractors by number, used cyclically; they differ in lightness when grey."""
@@ -47,7 +60,8 @@ def shares(
     result : Result
         A result over one swept parameter, with labels, of several gear pairs or starts.
     contact : Axes, optional
-        Axes for the share of motions that lose contact, if the result contains it.
+        Axes for the share of motions that leave period 1, and of those that lose contact if the
+        result contains it. Without them the former is drawn at the edge below period 1.
 
     Returns
     -------
@@ -71,17 +85,18 @@ def shares(
     >>> axes = Figure(layout="constrained").subplots()
     >>> drawn = figures.shares(axes, gearchaos.open_result("starts.h5"))
     """
-    limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
+    counted, limits = motion_shares(result), diagram_lanes(result, between).limits
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))
     each = dict(zip(counted.motions, (counted.counts.T / counted.other.lanes), strict=True))
     lowest_first = sorted(each, key=known.index, reverse=True)
     looks = [{"label": motion, **look_of(motion)} for motion in lowest_first]
     layers = _stacked(axes, values, [each[motion] for motion in lowest_first], looks)
-    layers.insert(0, _confidence(axes, values, counted.other, "none"))
     axes.set_ylabel("Share of motions")
-    if contact and counted.apart:
-        _confidence(contact, values, counted.apart, "o")
-        contact.set_ylabel("Share that\nloses contact", linespacing=1.0)
+    if contact is None:
+        layers.insert(0, _confidence(axes, values, counted.other, NOT_PERIOD_1))
+    else:
+        contact.set_ylabel("Share, with 95 %\nconfidence", linespacing=1.0)
+        layers[:0] = _two_shares(contact, values, counted)
     for one in filter(None, (axes, contact)):
         one.set(xlim=limits, ylim=(-0.03, 1.03), xlabel=axis_label(result, result.axis))
         few_ticks(one, 8, 6)
@@ -97,7 +112,7 @@ def shares_page(
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
-    """Draw the shares of all motions (a) above the share that loses contact (b), if known.
+    """Draw the shares of all motions (a) above those that leave period 1 or lose contact (b).
 
     Parameters
     ----------
@@ -120,16 +135,11 @@ def shares_page(
     --------
     >>> page = figures.shares_page(gearchaos.open_result("starts.h5"))
     """
-    panels = 2 if motion_shares(result).apart else 1
-    height = height_mm or (60.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
-    with page(width_mm, height) as figure:
-        ratios = (1.6, 1.0)[:panels]
-        stack = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        contact = stack[-1] if panels == 2 else None
-        drawn = shares(stack[0], result, between=between, contact=contact)
-        if panels == 2:
-            stack[0].set_xlabel("")
-            letter(stack)
+    with page(width_mm, height_mm or 60.0 + 0.35 * width_mm) as figure:
+        stack = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
+        drawn = shares(stack[0], result, between=between, contact=stack[1])
+        stack[0].set_xlabel("")
+        letter(stack)
         names = zip(REPEATS, ("gear pairs", "starts"), strict=True)
         sizes = [f"{result[axis].size} {name}" for axis, name in names if axis in result.axes]
         remark(stack[0], f"{' with '.join(sizes)} each")
@@ -156,16 +166,26 @@ def _stacked(
     return drawn
 
 
-def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Drawn:
+def _two_shares(axes: Axes, values: Floats, counted: MotionShares) -> list[Drawn]:
+    """Draw the share that leaves period 1 and, if known, the share that loses contact."""
+    few = values.size <= MOST_BARS
+    # Side by side, so that neither hides the other.
+    aside = 0.1 * np.diff(values).min() if few and values.size > 1 and counted.apart else 0.0
+    drawn = [_confidence(axes, values - aside, counted.other, LEAVES_PERIOD_1)]
+    if counted.apart:
+        drawn.append(_confidence(axes, values + aside, counted.apart, LOSES_CONTACT))
+    return drawn[::-1]
+
+
+def _confidence(axes: Axes, values: Floats, counted: Counted, look: dict[str, Any]) -> Drawn:
     """Draw shares with their confidence intervals: error bars for few values, else a band."""
-    label = "not period 1, 95 % confidence"
     share, (low, high) = counted.shares, counted.intervals.T
     if values.size <= MOST_BARS:
-        look: dict[str, Any] = {"ms": 2.5, "lw": 0.7, "capsize": 1.5, "capthick": 0.7}
-        reach = (share - low, high - share)
-        return axes.errorbar(values, share, reach, fmt=marker, color=BLACK, label=label, **look)
-    axes.plot(values, share, color=BLACK, linewidth=0.6, drawstyle="steps-mid")
-    band: dict[str, Any] = {"step": "mid", "color": BLACK, "alpha": 0.25, "linewidth": 0.0}
+        size: dict[str, Any] = {"ms": 2.5, "lw": 0.7, "capsize": 1.5, "capthick": 0.7}
+        return axes.errorbar(values, share, (share - low, high - share), **size, **look)
+    color, label = look["color"], look["label"]
+    axes.plot(values, share, color=color, linewidth=0.6, drawstyle="steps-mid")
+    band: dict[str, Any] = {"step": "mid", "color": color, "alpha": 0.25, "linewidth": 0.0}
     return axes.fill_between(values, low, high, label=label, **band)
 
 
@@ -215,7 +235,12 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
         face, size, edge = (_look(one)["facecolor"], 5.0, 0.6) if one.period else (BLACK, 1.0, 0.0)
         points = one.section[:MOST_POINTS, columns].T
         axes.plot(*points, "o", ms=size, mfc=face, mec=BLACK, mew=edge)
-    axes.set(xlim=ends[0][[0, -1]], ylim=ends[1][[0, -1]], xlabel=_label(x), ylabel=_label(y))
+    axes.set(
+        xlim=ends[0][[0, -1]],
+        ylim=ends[1][[0, -1]],
+        xlabel=_label(found, x),
+        ylabel=_label(found, y),
+    )
     return image
 
 
@@ -300,9 +325,12 @@ def _look(one: Basin) -> dict[str, Any]:
     return {"facecolor": COLORS[(one.number - 1) % len(COLORS)], "edgecolor": "0.55"}
 
 
-def _label(state: str) -> str:
-    subject = subject_of(state)
-    return f"{subject.long_name.capitalize()}, {subject.symbol} ({scale_of(state).stands_for})"
+def _label(found: Basins, state: str) -> str:
+    """Return the label of a state, in the units of the basins."""
+    subject, scale = subject_of(state), scale_of(state)
+    words = subject.long_name, subject.symbol
+    units = found.units.get(state, "1")
+    return label_of(Variable(state, (), "float64", units, *words, scale=scale))
 
 
 def _in_words(one: Basin) -> str:

@@ -1,7 +1,7 @@
 """A page for a journal: its size and style, the texts beside its panels, and its file."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from io import BytesIO
@@ -25,6 +25,7 @@ from gearchaos.figures.style import (
     styled,
 )
 from gearchaos.figures.ticks import light
+from gearchaos.figures.units import explained_units
 from gearchaos.interrupts import check
 from gearchaos.results.files.atomic_file import check_output, replacing
 from gearchaos.version import software_version
@@ -78,7 +79,23 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         canvas: Any = FigureCanvasAgg(figure)
         canvas.get_renderer().mathtext_parser = FORMULAE
         yield figure
+        _explain(figure)
         _lay_out(figure, layout)
+
+
+def _explain(figure: Page) -> None:
+    """Explain the units of a page in the title of its legend, or else in its footnote."""
+    words = explained_units(figure)
+    if not words:
+        return
+    if figure.legends:
+        legend = figure.legends[-1]
+        before = legend.get_title().get_text()
+        # A legend without a title has the text "None".
+        lines = [before, words] if before not in ("", "None") else [words]
+        legend.set_title("\n".join(lines))
+    else:
+        footnote(figure, "\n".join(filter(None, (figure.get_supxlabel(), words))))
 
 
 @contextmanager
@@ -173,18 +190,27 @@ def save_figure(
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in ENDINGS:
         raise FigureError(f"{path}: a figure ends in {' or '.join('.' + f for f in ENDINGS)}")
-    drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
     check()
-    with replacing(path, overwrite=overwrite) as partial, styled():
+    with replacing(path, overwrite=overwrite) as partial:
+        partial.write_bytes(picture(figure, kind, dpi))
+
+
+def picture(
+    figure: Figure, kind: str, dpi: int = 300, settings: Mapping[str, Any] | None = None
+) -> bytes:
+    """Return the content of the file that `save_figure` writes.
+
+    ``kind``: one of `ENDINGS`; ``settings``: of matplotlib, in place of those of the style.
+    """
+    drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
+    with styled(settings):
         for axes in figure.axes if kind == "eps" else ():
             axes.set_rasterization_zorder(BELOW_AXIS)
         figure.savefig(drawn, format=kind, dpi=dpi * FINENESS.get(kind, 1), **_facts(kind))
         for axes, zorder in zip(figure.axes, before, strict=True):
             axes.set_rasterization_zorder(zorder)
-        content = drawn.getvalue()
-        if kind == "eps":
-            content = re.sub(rb"\n%%CreationDate: .*", b"", content, count=1)
-        partial.write_bytes(content)
+    content = drawn.getvalue()
+    return re.sub(rb"\n%%CreationDate: .*", b"", content, count=1) if kind == "eps" else content
 
 
 def _facts(kind: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.reading.result import Result
 
 OUTLYING_SHARE = 0.03  # Share of the lanes at either end that limits may leave out.
+WIDEST = 0.84  # Width of axes relative to that of a page with one panel in a row.
 MARGIN = 0.05  # Margin of the limits, relative to their distance.
 
 _DIAGRAM = "_gearchaos_diagram"
@@ -74,8 +75,10 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     axes.set_xlabel(axis_label(result, result.axis))
     color, label = own.points.get_color(), str(own.points.get_label())
     if not label.startswith("_"):
-        shape = own.points.get_marker(), own.points.get_linestyle()
-        look: dict[str, Any] = {**dict(zip(("marker", "ls"), shape, strict=True)), "ms": 4.0}
+        sample = own.parts.get("line", own.points)
+        shape = sample.get_marker(), sample.get_linestyle()
+        look: dict[str, Any] = dict(zip(("marker", "ls"), shape, strict=True))
+        look |= {"ms": 4.0, "lw": sample.get_linewidth()}
         own.named.insert(0, Line2D([], [], color=color, label=label, **look))
     if own.lanes.diverged.any():
         look = {"marker": "|", "ms": 8.0, "mew": 0.8, "color": VERMILION}
@@ -165,7 +168,9 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
     if not handles:
         return None
     # Widths in points: a column takes its mark, its gaps and 3.2 for each letter.
-    room = axes.get_window_extent().width / axes.figure.dpi * 72.0
+    # The layout, which comes later, gives the axes more of the page than they have now.
+    figure: Any = axes.figure
+    room = 72.0 * max(axes.get_position().width, WIDEST) * figure.get_size_inches()[0]
     column = 17.0 + 3.2 * max(len(str(one.get_label())) for one in handles)
     most = int(np.clip(room // column, 1, 3))
     columns = -(-len(handles) // -(-len(handles) // most))

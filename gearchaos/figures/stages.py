@@ -50,7 +50,7 @@ def shade_stages(
     Returns
     -------
     list of Rectangle
-        One rectangle for each stage within the limits.
+        One rectangle for each stage within the limits; its label is the kind of the stage.
 
     Raises
     ------
@@ -80,7 +80,8 @@ def shade_stages(
     for kind, (left, right) in zip(kinds, pairwise(edges), strict=True):
         if left < high and right > low:
             place = max(left, low), min(right, high)
-            shades.append(axes.axvspan(*place, linewidth=0.0, zorder=0.0, **look_of(kind)))
+            look: Any = {"linewidth": 0.0, "zorder": 0.0, "label": kind, **look_of(kind)}
+            shades.append(axes.axvspan(*place, **look))
             drawn.add(kind)
     axes.set_xlim(low, high)
     if legend:

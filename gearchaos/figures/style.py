@@ -1,7 +1,7 @@
 """How the figures look: sizes for a journal column, and colours that also print in grey."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -26,6 +26,15 @@ GREY = "#595959"
 
 OVERLAID = ((BLACK, "."), (BLUE, "^"), (GREEN, "v"), (PURPLE, "s"), (ORANGE, "D"))
 """Colours and markers of several results in the same axes."""
+
+DASHES: dict[str, Any] = {
+    ".": "-",
+    "^": (0, (4, 2)),
+    "v": (0, (1.5, 1.5)),
+    "s": (0, (6, 2, 1.5, 2)),
+    "D": (0, (8, 2)),
+}
+"""Dashes of the lines of several results, by the marker of their dots; all have one width."""
 
 _STYLE = mpl.rc_params_from_file(
     Path(__file__).with_name("journal.mplstyle"), use_default_template=False
@@ -78,9 +87,12 @@ def with_font(name: str | None) -> Iterator[None]:
 
 
 @contextmanager
-def styled() -> Iterator[None]:
-    """Set the project's style within a context; other threads wait before they draw pages."""
-    with DRAWING, mpl.rc_context(style()):
+def styled(settings: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Set the project's style within a context; other threads wait before they draw pages.
+
+    ``settings``: of matplotlib, in place of those of the style.
+    """
+    with DRAWING, mpl.rc_context(style() | dict(settings or {})):
         yield
 
 

@@ -1,7 +1,7 @@
 """The page of a sweep: bifurcation diagram above Lyapunov chart, on one shared axis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import cycle
 from typing import Any
 
@@ -34,6 +34,7 @@ def bifurcation_page(
     stages: bool | LabelledLanes = False,
     marked: tuple[str, Sequence[float]] | None = None,
     labels: Sequence[str] | None = None,
+    lines: bool = False,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
@@ -43,7 +44,7 @@ def bifurcation_page(
     ----------
     result : Result or sequence of Result
         Results over one swept parameter, the same for all; they are drawn over each other.
-    variable, between
+    variable, between, lines
         As for `bifurcation`. Amplitudes at mesh orders are drawn as by `waterfall`.
     stages : bool or LabelledLanes
         Shade the stages of the result behind both panels, or those of lanes with other labels.
@@ -74,6 +75,7 @@ def bifurcation_page(
     2
     """
     overlay = _overlay(result, variable, between, labels)
+    overlay = replace(overlay, lines=lines)
     overlay.check(bool(stages))
     height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if overlay.panels == 2 else 0.7)
     with page(width_mm, height) as figure:
@@ -94,6 +96,7 @@ class _Overlay:
     labels: Sequence[str]
     variable: str | None
     between: Between
+    lines: bool = False
 
     @property
     def of_orders(self) -> bool:
@@ -196,17 +199,20 @@ def _draw_result(
     if len(overlay.results) > 1:
         label = plain(overlay.labels[number]) or "untitled"
         shown |= {"color": look[0], "marker": look[1], "label": label}
-    # Later results have larger dots and wider lines: drawn below, they show where results agree.
-    zorder = 2.0 - 0.01 * number
+    # Both remain visible where results agree: later results have larger dots, which are drawn
+    # below, and dashed lines, which are drawn above.
+    zorder, above = 2.0 - 0.01 * number, 2.0 + 0.01 * number
     if overlay.of_orders:
         waterfall(stack[0], one, str(variable), between=overlay.between)
     elif variable is not None or section_variables(one):
-        drawn = bifurcation(stack[0], one, variable, **shown)
+        drawn = bifurcation(stack[0], one, variable, lines=overlay.lines, **shown)
         drawn.points.set_zorder(zorder)
+        if "line" in drawn.parts:
+            drawn.parts["line"].set_zorder(above)
     if LARGEST_EXPONENT in one:
         # One legend of the colours is enough.
         curve = lyapunov(stack[-1], one, **shown | ({"label": None} if len(stack) == 2 else {}))
-        curve.points.set(zorder=zorder, linewidth=0.6 * (number + 1))
+        curve.points.set_zorder(above)
 
 
 def _mark_stretches(panels: Sequence[Axes], result: Result) -> None:

@@ -139,6 +139,21 @@ EXPONENTS_PART = Part(
         ),
     ),
 )
+DIMENSION_PART = Part(
+    "with all Lyapunov exponents, for their dimension",
+    (
+        Output(
+            "kaplan_yorke_dimension",
+            "Kaplan-Yorke dimension of the stroboscopic section",
+            r"$D_\mathrm{KY}$",
+            errors=(f"kaplan_yorke_dimension{names.STANDARD_ERROR}",),
+        ),
+        Output(
+            f"kaplan_yorke_dimension{names.STANDARD_ERROR}",
+            "standard error of the Kaplan-Yorke dimension, an upper bound",
+        ),
+    ),
+)
 CROSSINGS_PART = Part(
     "if steps are split where an element is met or left",
     (
@@ -326,6 +341,7 @@ PARTS = (
     MOTION_PART,
     RECORD_PART,
     EXPONENTS_PART,
+    DIMENSION_PART,
     CROSSINGS_PART,
     CONTACT_PART,
     EXTREMES_PART,

@@ -13,6 +13,7 @@ from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.figures import basins, basins_page, fractions
 from gearchaos.figures.ensembles import COLORS
 from gearchaos.records.label import DIVERGED, UNRESOLVED
+from gearchaos.results.reading.basin_units import physical_basins
 from gearchaos.results.reading.result import Result
 
 from .commands import run_module
@@ -193,6 +194,38 @@ def test_json_reports_all_of_it(folder, grid):
         assert facts["section"] == one.section.tolist()
         assert facts["contact"] == one.contact
         assert facts["means"]["crossings_per_period"] == one.means["crossings_per_period"]
+
+
+def test_physical_units_are_those_of_the_scales(tmp_path):
+    scene = 'scene.effects=["pitch_error", "stiffness_variation", "backlash"]'
+    scales = ("mesh.length_scale_um=25.0", "outputs.contact=true")
+    result = computed([1.04], scene, "start.kind=grid", "start.count=3", *scales)
+    result.save(tmp_path / "grid.h5")
+    rate = float(result.parameters["scaling_frequency"].values)
+    plain, physical = (
+        json.loads(run(tmp_path, "grid.h5", "--json", *units).out)
+        for units in ((), ("--units", "physical"))
+    )
+    assert plain["units"] == {}
+    units = {"delta_5": "um", "delta_5_rate": "m/s", "lyapunov_exponent": "s^-1"}
+    assert units.items() <= physical["units"].items()
+    factors = [25.0, 25e-6 * rate]
+    for one, other in zip(plain["basins"], physical["basins"], strict=True):
+        assert np.array(other["section"]) == pytest.approx(np.array(one["section"]) * factors)
+        assert other["exponent"] == pytest.approx(one["exponent"] * rate)
+        assert other["share"] == one["share"]
+        assert other["means"]["time_driving_tangential"] == one["means"]["time_driving_tangential"]
+    page = basins_page(physical_basins(find_basins(result)))
+    assert page.axes[0].get_xlabel().endswith("(\N{MICRO SIGN}m)")
+    assert page.axes[0].get_xlim() == pytest.approx((-3.0 * 37.5, 3.0 * 37.5))
+    table = run(tmp_path, "grid.h5", "--csv", "--units", "physical").out
+    assert "exponent [s^-1]" in table.splitlines()[0]
+
+
+def test_units_that_the_configuration_does_not_give_are_refused(folder):
+    ended = run(folder, "grid.h5", "--units", "physical")
+    assert (ended.code, ended.out) == (2, "")
+    assert "length_scale_um" in ended.err
 
 
 def test_figures_are_drawn_and_foreign_files_kept(folder):

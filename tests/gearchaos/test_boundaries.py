@@ -268,6 +268,16 @@ def test_the_map_and_the_page_are_drawn(files):
         assert (folder / name).stat().st_size > 10_000
 
 
+def test_a_report_lists_the_boundaries(files, found):
+    folder, _ = files
+    done = run("report", "map_boundaries.h5", cwd=folder)
+    assert (done.code, done.out) == (0, "map_boundaries.html\n"), done.err
+    page = (folder / "map_boundaries.html").read_text()
+    assert page.count("<img ") == 1
+    for one in found.boundaries:
+        assert f">{one.values[:, 0].min():.6g}</td>" in page
+
+
 def test_each_kind_has_a_line_of_its_own(found):
     from matplotlib.figure import Figure
 

@@ -234,6 +234,17 @@ def test_the_diagram_and_the_page_are_drawn(files):
         assert (folder / name).stat().st_size > 10_000
 
 
+def test_a_report_lists_branches_and_special_points(files):
+    folder, _ = files
+    done = run("report", "sweep_branches.h5", cwd=folder)
+    assert (done.code, done.out) == (0, "sweep_branches.html\n"), done.err
+    page = (folder / "sweep_branches.html").read_text()
+    assert page.count("<img ") == 1 and "period doubling" in page
+    for one in read_branches(folder / "sweep_branches.h5").branches:
+        for special in one.specials:
+            assert f">{special.value:.6g}</td>" in page
+
+
 def test_stable_orbits_are_solid_and_unstable_ones_dashed(files):
     from matplotlib.figure import Figure
 

@@ -179,7 +179,7 @@ def wait_for(page, panel: str, values: np.ndarray) -> list:
 
 @needs_browser
 def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, path, address):
-    look(page, address, "?direction=1.0")
+    look(page, address, "?direction=1.0&units=dimensionless")
     value = float(click(page, 0.8))
     assert value in gearchaos.open_result(path)["pitch_error"] and value > 3.0
     lane, motion = lane_of(path, pitch_error=value, direction="downwards")
@@ -256,7 +256,7 @@ def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
 ):
     sizes: list[int] = []
     page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
-    look(page, address)
+    look(page, address, "?units=dimensionless")
     # On a busy machine a picture may be under way for longer than a second.
     shown = -1
     while shown != len(sizes):

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import gearchaos
-from gearchaos.explorer.charts import plain_text
+from gearchaos.explorer.text import plain_text
+from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import VERMILION
@@ -38,9 +39,9 @@ AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machi
 MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
     [...menu.options].map(one => [one.value, one.textContent])])"""
 """Title of every menu, and value and text of its entries."""
-LABEL = """() => [...Bokeh.documents[0]._all_models.values()]
-    .filter(one => one.type == "Figure")[0].left[0].axis_label"""
-"""Label at the vertical axis of the first chart."""
+LABELS = """[...Bokeh.documents[0]._all_models.values()]
+    .filter(one => one.type == "Figure").map(one => one.left[0].axis_label)"""
+"""Labels at the vertical axes of all charts that the page has drawn."""
 FAULT = f"b[style*='{VERMILION}']"
 
 
@@ -74,7 +75,7 @@ def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
         try:
             page = browser.new_page(viewport={"width": 800, "height": 600})
             page.set_default_timeout(AT_MOST)
-            page.goto(server.stdout.readline().strip())
+            page.goto(f"{server.stdout.readline().strip()}?units=dimensionless")
             # A chart, and the four panels of the motion.
             page.locator(".bk-Figure >> nth=4").wait_for()
             page.locator("pre:has-text('response')").wait_for()
@@ -86,12 +87,23 @@ def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
     assert {"section_delta_5", "lyapunov_exponent"} & {*seen}
 
 
+def variables_of(result: gearchaos.Result) -> list[str]:
+    """Return the variables of the menu in their order."""
+    if len(swept_axes(result)) == 1:
+        return diagram_variables(result)
+    of_lanes = [name for name in result if result.dims(name) == result.axes]
+    return sorted(of_lanes, key=lambda name: name != "motion")
+
+
 def entries_drawn(page, result: gearchaos.Result) -> list[str]:
     """Choose every entry of every menu, see that it is drawn, and return the variables."""
     drawn: list[str] = []
     menus = page.locator("select")
     for place, (title, entries) in enumerate(menus.evaluate_all(MENUS)):
-        for value, text in entries:
+        names = variables_of(result) if title == "Variable" else [text for _, text in entries]
+        for (value, label), text in zip(entries, names, strict=True):
+            if title == "Variable":
+                assert label.startswith(plain_text(axis_label(result, text, 200)))
             menus.nth(place).select_option(value)
             words = {"Variable": f"--variable {text}", "Motion from": f"--begin {text}"}
             words["Units"] = "--units physical" if text == "physical" else "plot"
@@ -102,6 +114,7 @@ def entries_drawn(page, result: gearchaos.Result) -> list[str]:
                 shown = text if len(swept_axes(result)) == 1 else result.axes[0]
                 label = " ".join(plain_text(axis_label(result, shown)).split())
                 page.wait_for_function(
-                    f"label => ({LABEL})().split(/\\s+/).join(' ') == label", arg=label
+                    f"label => {LABELS}.some(one => one.split(/\\s+/).join(' ') == label)",
+                    arg=label,
                 )
     return drawn

@@ -218,7 +218,8 @@ UNITS = {
     "s": "mesh_period",
     "1": "status period time return_distance section_error start_state end_state "
     "crossings_per_period time_driving_axial impacts_back_axial load_factor_rms order exponent "
-    "load_factor_largest contact_tangential damping_ratio nothing_of_the_kind",
+    "kaplan_yorke_dimension load_factor_largest contact_tangential damping_ratio "
+    "nothing_of_the_kind",
 }
 """Some outputs and parameters of each physical unit, separated by spaces."""
 

@@ -191,12 +191,22 @@ def test_many_values_are_steps_with_a_band(axes):
 
 
 @pytest.mark.parametrize(("width", "contact"), [(85.0, True), (180.0, False)])
-def test_the_page_has_a_panel_for_contact_if_that_is_known(width, contact):
-    page = shares_page(known_motions(contact=contact), width_mm=width)
+def test_the_page_has_the_share_that_leaves_period_1_and_that_loses_contact(width, contact):
+    result = known_motions(contact=contact)
+    page = shares_page(result, width_mm=width)
     assert [axes.get_ylabel() for axes in page.axes] == [
         "Share of motions",
-        *(["Share that\nloses contact"] if contact else []),
+        "Share, with 95 %\nconfidence",
     ]
+    counted = motion_shares(result)
+    expected = [counted.other, *([counted.apart] if contact else [])]
+    drawn = page.axes[1].containers
+    assert len(drawn) == len(expected)
+    for container, one in zip(drawn, expected, strict=True):
+        np.testing.assert_allclose(container.lines[0].get_ydata(), one.shares)
+        (bars,) = container.lines[2]
+        np.testing.assert_allclose(np.array(bars.get_segments())[:, :, 1], one.intervals)
+    assert not page.axes[0].lines
     assert page.axes[-1].get_xlabel() == "Accuracy grade of both gears"
     assert page.axes[0].get_title("right") == "10 gear pairs with 2 starts each"
     (legend,) = page.legends
@@ -205,7 +215,7 @@ def test_the_page_has_a_panel_for_contact_if_that_is_known(width, contact):
     )
     assert [text.get_text() for text in legend.get_texts()] == [
         *("period 1", "period 2", "period 3", "period 4 or more", "chaotic", "diverged"),
-        INTERVAL,
+        *("leaves period 1", "loses contact")[: len(expected)],
     ]
     written = [text for text in page.findobj(Text) if text.get_text()]
     assert min(text.get_fontsize() for text in written) >= 7.0

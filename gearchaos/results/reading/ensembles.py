@@ -1,6 +1,7 @@
 """Ensembles of gear pairs and starts: the shares of their motions, and their basins."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -181,6 +182,8 @@ class Basins(NamedTuple):
         Start values along the grid by state, in C order; empty if the starts are no grid.
     entropy : list of tuple
         `basin_entropy` at each value; empty if the starts are no grid.
+    units : mapping of str to str
+        Physical units of states, exponents and means by name; empty for dimensionless basins.
     """
 
     result: Result
@@ -190,6 +193,7 @@ class Basins(NamedTuple):
     basins: list[Basin]
     grid: dict[str, Floats]
     entropy: list[tuple[float, float]]
+    units: Mapping[str, str] = MappingProxyType({})
 
 
 def in_order(numbers: Iterable[int]) -> list[int]:

@@ -1,0 +1,191 @@
+"""The diagram or the map of a result as one interactive page, without a server."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from bokeh.embed import file_html
+from bokeh.layouts import column
+from bokeh.models import ColorBar, CustomJS, Div, LinearColorMapper, Select, Span
+from bokeh.plotting import figure
+from bokeh.resources import INLINE
+from matplotlib.colors import ListedColormap, to_hex
+from matplotlib.figure import Figure
+
+from gearchaos.arrays import Array, Floats
+from gearchaos.errors import FigureError
+from gearchaos.explorer.shades import COLOURS, stage_boxes
+from gearchaos.explorer.text import plain_text
+from gearchaos.figures.diagrams import diagram_variables
+from gearchaos.figures.labels import axis_label
+from gearchaos.figures.lanes import cell_edges, diagram_lanes, map_axes, swept_axes
+from gearchaos.figures.maps import parameter_map
+from gearchaos.figures.panel import robust_limits
+from gearchaos.figures.style import GREY, OVERLAID
+from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, UNSWEPT, WAYS
+from gearchaos.results.reading.jumps import directions_of
+from gearchaos.results.reading.result import Result
+
+LARGEST_PAGE = 5_000_000
+"""Most bytes of a page."""
+
+MOST_NUMBERS = 400_000
+"""Most numbers that the charts of a page hold at first; each takes 5.3 bytes."""
+
+FINEST = 600  # Most cells along an axis of a map whose values are not evenly spaced.
+
+WIDE: Any = {"sizing_mode": "stretch_width"}
+LOOK: Any = {
+    **WIDE,
+    "min_border_left": 110,
+    "tools": "pan,wheel_zoom,box_zoom,hover,reset,save",
+    "active_drag": "box_zoom",
+    "active_scroll": "wheel_zoom",
+}
+
+
+def static_page(result: Result) -> str:
+    """Return an HTML page with the charts of a sweep or a map and a menu of its variables.
+
+    Charts with more numbers than fit are thinned out: of each lane the last section points are
+    kept, then every n-th lane or cell.
+
+    Raises
+    ------
+    FigureError
+        If the result cannot be drawn, or the page is too large with very few points.
+    """
+    numbers = MOST_NUMBERS
+    while numbers > 1000:
+        page = _page(result, numbers)
+        if len(page.encode()) <= LARGEST_PAGE:
+            return page
+        numbers //= 2
+    raise FigureError(f"the page is larger than {LARGEST_PAGE} bytes; choose a slice with --at")
+
+
+def _page(result: Result, numbers: int) -> str:
+    """Return the page with at most this number of numbers in its charts."""
+    of_map = len(swept_axes(result)) > 1
+    names = _map_variables(result) if of_map else diagram_variables(result)
+    draw, charts, ranges = _map if of_map else _diagram, {}, list[Any]()
+    for name in names:
+        panel, kinds = draw(result, name, max(1, numbers // len(names)))
+        # All charts move together, whichever is shown.
+        panel.x_range = ranges[0] if ranges else panel.x_range
+        ranges.append(panel.x_range)
+        charts[name] = column(panel, _text(_legend(kinds)), visible=name == names[0], **WIDE)
+    entries = [(name, plain_text(axis_label(result, name, 200))) for name in names]
+    menu = Select(options=entries, value=names[0], title="Variable", width=500)
+    show = "for (const [name, one] of Object.entries(charts)) one.visible = name == menu.value"
+    menu.js_on_change("value", CustomJS(args={"charts": charts, "menu": menu}, code=show))
+    title = _text(f"<b>{escape(str(result.metadata.get('title', '')))}</b>")
+    parts = [title, menu, *charts.values()]
+    if LARGEST_EXPONENT in result and not of_map:
+        parts.append(_exponents(result, numbers, ranges[0]))
+    return str(file_html(column(parts, **WIDE), INLINE, "gearchaos"))
+
+
+def _text(markup: str) -> Div:
+    return Div(text=markup, disable_math=True, **WIDE)
+
+
+def _legend(kinds: dict[str, str]) -> str:
+    swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
+    return "".join(swatch.format(colour, escape(name)) for name, colour in kinds.items())
+
+
+def _map_variables(result: Result) -> list[str]:
+    """Return the variables of a map, the motion first."""
+    map_axes(result)  # Raises FigureError if other axes are left.
+    names = [name for name in result if result.dims(name) == result.axes]
+    return sorted(names, key=lambda name: name != LABELS[0])
+
+
+def _panel(result: Result, x: str, y: str, height: int, ends: Sequence[Any]) -> Any:
+    """Make a chart with labels and limits; ``ends``: limits along x, and along y if known."""
+    ranges = dict(zip(("x_range", "y_range"), ends, strict=False))
+    panel = figure(height=height, tooltips="$x, $y", **ranges, **LOOK)
+    panel.xaxis.axis_label, panel.yaxis.axis_label = (
+        plain_text(axis_label(result, name, length)) for name, length in ((x, 80), (y, 26))
+    )
+    panel.axis.axis_label_text_font_style, panel.toolbar.logo = "normal", None
+    return panel
+
+
+def _diagram(result: Result, variable: str, most: int) -> tuple[Any, dict[str, str]]:
+    """Draw a variable over the swept parameter; each direction has a colour."""
+    limits = diagram_lanes(result).limits
+    boxes, kinds = stage_boxes(result, limits)
+    ways = directions_of(result)
+    drawn = [_thinned(one, variable, most // 2 // len(ways)) for one in ways]
+    values = np.concatenate([y for _, y in drawn]).astype(float)
+    ends = robust_limits(values, values) if values.size else (0.0, 1.0)
+    panel = _panel(result, result.axis, variable, 360, (limits, ends))
+    for box in boxes:
+        panel.add_layout(box)
+    for (x, y), (colour, _), way in zip(drawn, OVERLAID, WAYS, strict=False):
+        named = {"legend_label": way} if len(ways) > 1 else {}
+        panel.scatter(x, y, size=2, color=colour, line_color=None, alpha=0.6, **named)
+    return panel, kinds
+
+
+def _thinned(result: Result, variable: str, most: int) -> tuple[Array, Array]:
+    """Return at most this number of points of a variable: swept values and values, as float32."""
+    lanes = diagram_lanes(result)
+    rows = result.lanes(variable)[lanes.numbers].reshape(lanes.numbers.size, -1)
+    rows = np.where(lanes.diverged[:, np.newaxis], np.nan, rows)
+    # The last points: of a periodic motion none is lost as long as a period is left.
+    rows = rows[:, -max(1, most // len(rows)) :]
+    every = -(-rows.size // most)
+    x, y = np.repeat(lanes.parameter, rows.shape[1])[::every], rows.ravel()[::every]
+    there = np.isfinite(y)
+    return x[there].astype(np.float32), y[there].astype(np.float32)
+
+
+def _exponents(result: Result, most: int, x_range: Any) -> Any:
+    """Draw the largest exponents of the lanes as dots and, for one lane per value, a line."""
+    panel = _panel(result, result.axis, LARGEST_EXPONENT, 220, (x_range,))
+    alone = not any(axis in UNSWEPT for axis in result.axes)
+    for one, (colour, _) in zip(directions_of(result), OVERLAID, strict=False):
+        x, y = _thinned(one, LARGEST_EXPONENT, most // 20)
+        panel.scatter(x, y, size=2, color=colour)
+        if alone or len(one.axes) == 1:
+            panel.line(x, y, color=colour)
+    panel.add_layout(Span(location=0.0, dimension="width", line_color=GREY, line_dash="dashed"))
+    return panel
+
+
+def _map(result: Result, variable: str, most: int) -> tuple[Any, dict[str, str]]:
+    """Draw a variable over two parameters as `figures.parameter_map` does."""
+    axes, (across, up) = Figure().subplots(), map_axes(result)
+    image: Any = parameter_map(axes, result, variable)
+    legend, colours = axes.get_legend(), image.cmap
+    numbers = np.ma.filled(image.get_array().astype(float), np.nan)
+    edges = [cell_edges(np.asarray(result[name], dtype=float)) for name in (across, up)]
+    every = max(1, int(np.ceil((numbers.size / most) ** 0.5)))
+    places = [_even(one, every) for one in edges]
+    cells = numbers[np.ix_(places[1], places[0])].astype(np.float32)
+    ends = [(float(one[0]), float(one[-1])) for one in edges]
+    panel = _panel(result, across, up, 560, ends)
+    panel.hover.tooltips = [("", "$x, $y"), (variable, "@image")]
+    shades = [to_hex(one) for one in colours(np.linspace(0.0, 1.0, min(colours.N, COLOURS)))]
+    low, high = image.get_clim()
+    mapper = LinearColorMapper(shades, low=low, high=high, nan_color=GREY)
+    (left, right), (bottom, top) = ends
+    frame = {"x": left, "y": bottom, "dw": right - left, "dh": top - bottom}
+    panel.image(image=[cells], color_mapper=mapper, **frame)
+    if not isinstance(colours, ListedColormap):
+        panel.add_layout(ColorBar(color_mapper=mapper), "right")
+    patches: list[Any] = legend.legend_handles if legend else []
+    return panel, {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
+
+
+def _even(edges: Floats, every: int) -> Array:
+    """Return the numbers of cells at evenly spaced places, fewer by the factor ``every``."""
+    widths = np.diff(edges)
+    size = widths.size if np.allclose(widths, widths[0]) else max(widths.size, FINEST)
+    count = -(-size // every)
+    middles = edges[0] + (np.arange(count) + 0.5) * (edges[-1] - edges[0]) / count
+    return np.asarray(np.clip(np.searchsorted(edges, middles) - 1, 0, widths.size - 1))

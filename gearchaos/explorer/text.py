@@ -1,0 +1,23 @@
+"""Labels of figures as plain Unicode."""
+
+import re
+from unicodedata import lookup
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
+
+
+def plain_text(label: str) -> str:
+    """Write a label in Unicode without formulae, such as δ₅' for ``$\\delta_5'$``."""
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
+    text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
+    text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
+    return re.sub(r"[${}\\]", "", text)
+
+
+def _letter(name: str) -> str:
+    case = "CAPITAL" if name[0].isupper() else "SMALL"
+    try:
+        return lookup(f"GREEK {case} LETTER {name.replace('lambda', 'lamda')}")
+    except KeyError:
+        return "\N{PRIME}" if name == "prime" else name

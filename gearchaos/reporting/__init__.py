@@ -1,0 +1,1 @@
+"""The report of a result: one page of HTML with figures, tables and a glossary."""
