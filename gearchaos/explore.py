@@ -3,7 +3,7 @@
 Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
 address in the browser is a link to the current view.
 
-Needs more packages: pip install gearchaos[explore].
+Needs more packages: pip install "gearchaos[explore]".
 """
 
 from collections.abc import Sequence
