@@ -24,10 +24,13 @@ CLONE = Path(__file__).resolve().parent.parent
 SMALL = ("sweep.count=12", "integration.transient_periods=60", "integration.recorded_periods=40")
 JOB = ["sweep", str(CLONE / "sweeps" / "pan2021.toml"), "--quiet"]
 JOB += [word for key in (*SMALL, "outputs.section_points=20") for word in ("--set", key)]
+MACHINE = ["sweep", str(CLONE / "sweeps" / "two_masses.toml"), "--quiet", "--output", "two.h5"]
+MACHINE += [word for key in SMALL for word in ("--set", key)]
 COMMANDS = (
     [*JOB, "--output", "main.h5"],
     [*JOB, "--set", "integration.method=flow_map", "--output", "map.h5"],
     [*JOB, "--dask", "local:1", "--output", "dask.h5"],
+    MACHINE,
     ["info", "main.h5", "--verify"],
     ["plot", "main.h5", "--stages", "--output", "main.png"],
     ["plot", "map.h5", "--output", "map.pdf"],
@@ -44,7 +47,8 @@ def main() -> None:
     """Print the versions, run all commands, and open the page."""
     declared = tomllib.loads((CLONE / "pyproject.toml").read_text("utf-8"))["project"]
     extras = declared["optional-dependencies"]
-    given = [*declared["dependencies"], *(one for name in extras for one in extras[name])]
+    used = [one for name in extras if name != "docs" for one in extras[name]]
+    given = [*declared["dependencies"], *used]
     names = dict.fromkeys(match(r"[\w.-]+", one)[0] for one in given)
     found = ", ".join(f"{name} {version(name)}" for name in names if name != "gearchaos")
     print(f"Python {sys.version.split()[0]}, {found}", flush=True)
@@ -65,7 +69,8 @@ def run(words: list[str], folder: str) -> None:
     done = subprocess.run(
         command(words), cwd=folder, stdout=subprocess.DEVNULL, stderr=-1, text=True
     )
-    shown = " ".join(word for word in words if word != "--set" and word not in JOB[1:])
+    hidden = {"--set", *JOB[1:], *SMALL}
+    shown = " ".join(word for word in words if word not in hidden)
     print(f"{time.monotonic() - began:6.1f} s  {shown}", flush=True)
     for line in done.stderr.splitlines():
         print(f"          {line}", flush=True)

@@ -8,7 +8,7 @@ For zsh, write it to a file named _gearchaos in a folder of $fpath:
 
     gearchaos completion zsh > FOLDER/_gearchaos
 
-Needs one more package: pip install gearchaos[completion].
+Needs one more package: pip install "gearchaos[completion]".
 """
 
 from argparse import ArgumentParser

@@ -6,7 +6,7 @@ address in the browser is a link to the current view.
 --save writes an interactive page instead: diagram with stages and exponents, or map, of at most 5
 MB, for readers without the program. It has no motions of lanes.
 
-Needs more packages: pip install gearchaos[explore].
+Needs more packages: pip install "gearchaos[explore]".
 """
 
 from collections.abc import Sequence

@@ -7,7 +7,7 @@ row per instant; --along lane gives its lanes, and --spectrum its amplitude spec
 CSV files give the units in brackets in the headings, [1] for pure numbers; Parquet files give them
 in the attributes that pandas reads.
 
-The path of the file goes to stdout. Needs more packages: pip install gearchaos[export].
+The path of the file goes to stdout. Needs more packages: pip install "gearchaos[export]".
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple

@@ -106,6 +106,17 @@ class Key:
         return float in (self.field.annotation, *typing.get_args(self.field.annotation))
 
     @property
+    def type_word(self) -> str:
+        """The type of the value in the words of TOML."""
+        held = next(part for part in _parts(self.field.annotation) if _type_word(part))
+        return _type_word(held)
+
+    @property
+    def example(self) -> str:
+        """An example as TOML; empty where none is declared."""
+        return toml_literal(self.field.examples[0]) if self.field.examples else ""
+
+    @property
     def valid(self) -> Range:
         """The range of a number."""
         rules = [(rule, name) for rule in self.field.metadata for name in Range._fields]
@@ -121,8 +132,22 @@ class Key:
     @property
     def remedy(self) -> str:
         """The expected value, with an example where there is one."""
-        example = f", such as {toml_literal(self.field.examples[0])}" if self.field.examples else ""
+        example = f", such as {self.example}" if self.example else ""
         return f"expected: {self._described}{example}"
+
+
+_WORDS = {bool: "boolean", int: "integer", float: "float", str: "string", dict: "table"}
+
+
+def _type_word(annotation: Any) -> str:
+    """Return the word for a type; empty for one that wraps others, such as an optional one."""
+    origin = typing.get_origin(annotation) or annotation
+    if origin is typing.Literal:
+        return _WORDS[type(typing.get_args(annotation)[0])]
+    if origin in (tuple, list):
+        inner = next(filter(None, map(_type_word, _parts(typing.get_args(annotation)[0]))))
+        return f"list of {inner}s"
+    return _WORDS.get(origin, "")
 
 
 def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:

@@ -61,8 +61,8 @@ def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
     lines = [
         title,
         "",
-        "| key | unit | range or choices | default | meaning |",
-        "|---|---|---|---|---|",
+        "| key | type | unit | range or choices | default | example | meaning |",
+        "|---|---|---|---|---|---|---|",
     ]
     for key in keys:
         column, unit = key.path.rpartition(".")[2], "" if key.units == "1" else key.units
@@ -71,7 +71,9 @@ def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
         limits = "; ".join(filter(None, bounds))
         # A key that selects the kind of a table has one choice per kind; it is not a range.
         choices = ", ".join(f"`{one}`" for one in key.choices if len(key.choices) > 1)
-        cells = [f"`{column}`", unit, limits or choices, _default(kind, key), key.wording]
+        example = f"`{key.example}`" if key.example else ""
+        given = [limits or choices, _default(kind, key), example]
+        cells = [f"`{column}`", key.type_word, unit, *given, key.wording]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

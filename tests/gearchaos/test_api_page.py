@@ -1,11 +1,12 @@
-"""The Python blocks of docs/api.md and README.md run as they stand there, one after the other."""
+"""The Python blocks of README.md and of pages in docs/ run as they stand, one after the other."""
 
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+import gearchaos
 
 CLONE = Path(__file__).resolve().parents[2]
 
@@ -16,8 +17,6 @@ def run_blocks(page: str, folder: Path, names: dict) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for block in re.findall(r"```python\n(.*?)```", (CLONE / page).read_text(), re.DOTALL):
-            if "pan2021.h5" in block:
-                shutil.copy("coarse.h5", "pan2021.h5")
             exec(compile(block, page, "exec"), names)
 
 
@@ -47,4 +46,36 @@ def test_what_the_readme_shows_in_python_runs(tmp_path):
     run_blocks("README.md", tmp_path, names)
     assert names["system"].orbit(period=2).multipliers.shape == (6,)
     assert names["result"]["lyapunov_exponent"].shape == (301,)
+
+
+def test_a_result_is_read_as_its_page_shows(tmp_path):
+    names: dict = {}
+    run_blocks("docs/how-to/read-results.md", tmp_path, names)
+    assert names["result"].parameters["mass_ratio_p"].origin == "derived"
     assert set(names["chaotic"].motion.values) == {2.0}
+
+
+SMALL = {
+    "pan2021": ["sweep.count=5"],
+    "planetary": ["sweep={parameter='operation.speed_rpm', values=[2000.0, 2700.0]}"],
+}
+SHORT = ["integration.transient_periods=20", "integration.recorded_periods=8"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["configuration", "control", "file-format", "machines"])
+def test_the_python_of_a_page_runs(page, tmp_path):
+    for name, overrides in SMALL.items():
+        if f'"{name}.h5"' in (CLONE / "docs" / f"{page}.md").read_text():
+            small = ["outputs.section_points=4", *SHORT, *overrides]
+            config = gearchaos.load_config(CLONE / "sweeps" / f"{name}.toml", small)
+            gearchaos.run(config).save(str(tmp_path / f"{name}.h5"))
+    names: dict = {}
+    run_blocks(f"docs/{page}.md", tmp_path, names)
+    expected = {
+        "configuration": lambda: names["groups"].load == 0.25966,
+        "control": lambda: names["motion"].captured.any(),
+        "file-format": lambda: names["exponent"].shape == (5,),
+        "machines": lambda: names["orbit"].stable and (tmp_path / "planets.png").exists(),
+    }
+    assert expected[page]()

@@ -340,7 +340,7 @@ def test_without_the_extra_the_message_names_it(tmp_path):
     command = [sys.executable, "-c", f"{code}sys.exit(main())", "gears.toml", "--dask", "local:1"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (4, "")
-    assert "pip install gearchaos[dask]" in done.stderr
+    assert 'pip install "gearchaos[dask]"' in done.stderr
 
 
 def test_a_worker_that_dies_before_it_has_joined_is_reported(tmp_path):

@@ -361,7 +361,7 @@ def test_what_is_wrong_is_reported_in_a_sentence(path, tmp_path, monkeypatch, ca
     assert "does not fit, install gearchaos again" in done.stderr.splitlines()[0]
     monkeypatch.setitem(sys.modules, "panel", None)
     code, text = said(str(path), "--port", "0")
-    assert code == 4 and "panel is not installed; pip install gearchaos[explore]" in text
+    assert code == 4 and 'panel is not installed; pip install "gearchaos[explore]"' in text
 
 
 def test_the_page_runs_the_code_that_other_commands_have_compiled(path):

@@ -124,7 +124,7 @@ def test_a_package_that_is_missing_is_named_with_the_remedy(
     for name in (package, f"{package}.io"):
         monkeypatch.setitem(sys.modules, name, None)
     assert main([str(path), str(path.with_suffix(f".{ending}"))]) == 4
-    assert f"{package} is not installed; pip install gearchaos[export]" in capsys.readouterr().err
+    assert f'{package} is not installed; pip install "gearchaos[export]"' in capsys.readouterr().err
     assert [one.name for one in path.parent.iterdir()] == ["r.h5"]
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(FileError, match="xarray is not installed"):

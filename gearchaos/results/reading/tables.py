@@ -32,7 +32,7 @@ def needed(package: str, extra: str = "export") -> Any:
             return import_module(package)
     except ImportError as error:
         text = f"the package {package.partition('.')[0]} is not installed"
-        raise FileError(f"{text}; pip install gearchaos[{extra}]") from error
+        raise FileError(f'{text}; pip install "gearchaos[{extra}]"') from error
 
 
 def to_xarray(result: "Result") -> Any:
