@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory, mkdtemp
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 import gearchaos
 
@@ -113,8 +114,11 @@ def run_module(
     module: str, *arguments: str, cwd: Path, preexec_fn: Callable | None = None, **options
 ) -> Ended:
     """Run ``python -m module`` in a folder; see `begin`, but ``env`` is a whole environment."""
-    if preexec_fn is None and "env" not in options:
+    forks = hasattr(os, "fork")
+    if preexec_fn is None and "env" not in options and forks:
         return begin(module, arguments, cwd, **options)[1]()
+    if not forks and ({*options} - {"env"} or preexec_fn):
+        pytest.skip("needs processes that fork")
     options["preexec_fn"] = preexec_fn
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(
@@ -142,6 +146,8 @@ def begin(
     unless this one runs ``beside`` it. ``imported``: modules that only some commands import.
     The way to wait refuses tracebacks; its ``unjudged``, for programs of others, does not.
     """
+    if not hasattr(os, "fork"):
+        pytest.skip("needs processes that fork")
     server, folder = _server(*imported), Path(mkdtemp(dir=_folder().name))
     files = [folder / name for name in ("in", "out", "err")]
     for file, text in zip(files, (stdin, "", ""), strict=True):

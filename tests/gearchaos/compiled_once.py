@@ -4,11 +4,15 @@ Loops are kept on disk, so that later processes find them. Those that need one w
 is compiling would each compile it, too: here they wait for it, for a while.
 """
 
-import fcntl
 import time
 from typing import IO, Any
 
 from gearchaos_kernels.cache import KernelCache
+
+try:
+    import fcntl
+except ImportError:  # Windows: every process compiles for itself.
+    fcntl = None
 
 LONGEST = 120.0
 """Seconds after which a process compiles for itself: whoever has the lock may be hanging."""
@@ -18,7 +22,9 @@ _held: dict[tuple[Any, Any], IO[str]] = {}
 
 
 def install() -> None:
-    """Replace how this process reads and writes loops."""
+    """Replace how this process reads and writes loops, where files can be locked."""
+    if fcntl is None:
+        return
     KernelCache.load_overload, KernelCache.save_overload = load_overload, save_overload
 
 

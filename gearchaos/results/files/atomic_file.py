@@ -22,8 +22,14 @@ from gearchaos.errors import FileError
 PARTIAL = ".partial"
 """Ending of the names of unfinished files. Nothing reads them; they can be deleted."""
 
-UNDISTURBED: int = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-"""Flags for files in a folder of our own: do not follow a link, do not wait for a writer."""
+UNDISTURBED: int = sum(getattr(os, f"O_{flag}", 0) for flag in ("NOFOLLOW", "NONBLOCK", "BINARY"))
+"""Flags for files in a folder of our own: do not follow a link, do not wait for a writer.
+
+Without the last flag, Windows converts line endings.
+"""
+
+_TO_SYNCHRONISE = os.O_RDWR if os.name == "nt" else os.O_RDONLY
+"""Windows synchronises only files that are open for writing."""
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or choose another place",
@@ -202,7 +208,7 @@ def _rename_to_new(partial: Path, target: Path) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+    descriptor = os.open(path, _TO_SYNCHRONISE)
     try:
         os.fsync(descriptor)
     finally:

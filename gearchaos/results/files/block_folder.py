@@ -21,12 +21,8 @@ from gearchaos.results.files.atomic_file import (
     unlinked_content,
     writing,
 )
+from gearchaos.results.files.file_locks import FileLock
 from gearchaos.version import Software
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
 
 LOCK = "lock"
 Facts: TypeAlias = Mapping[str, Any]
@@ -39,8 +35,7 @@ class StoreLock:
     """A locked file in the folder of an output; a killed process leaves it unlocked.
 
     A sweep of all blocks locks the folder for itself. Shards share the lock; two equal shards do
-    the same work and write the same bits. On a system without such locks, two sweeps that write to
-    one output are not detected.
+    the same work and write the same bits. `FileLock` describes the locks of each system.
 
     Parameters
     ----------
@@ -66,6 +61,7 @@ class StoreLock:
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:
         path = folder / LOCK
         self._descriptor: int | None = None
+        self._lock: FileLock | None = None
         with writing(folder):
             while self._descriptor is None:
                 with suppress(FileExistsError):
@@ -78,50 +74,46 @@ class StoreLock:
                     try:
                         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                             raise FileError(f"{path}: is not a regular file; delete it")
-                        _lock(descriptor, shared)
+                        self._lock = FileLock(descriptor, path, shared)
                         if os.path.samestat(os.fstat(descriptor), path.lstat()):
                             self._descriptor = descriptor
                     except BlockingIOError as error:
+                        more = f" ({error})" if error.args and error.errno is None else ""
                         raise FileError(
                             f"{output}: another sweep is writing to it; wait for its end or "
-                            "choose another --output"
+                            f"choose another --output{more}"
                         ) from error
                     finally:
                         if self._descriptor is None:
-                            os.close(descriptor)
+                            self._close(descriptor)
 
     def alone(self) -> bool:
         """Take the lock for this process alone; return whether that succeeded."""
         with suppress(BlockingIOError):
-            if self._descriptor is not None:
-                _lock(self._descriptor, shared=False)
+            if self._lock is not None:
+                self._lock.become_alone()
                 return True
         return False
 
     def release(self) -> None:
         """Release the lock, so that other sweeps can use the folder."""
         if self._descriptor is not None:
-            os.close(self._descriptor)
+            self._close(self._descriptor)
             self._descriptor = None
+
+    def _close(self, descriptor: int) -> None:
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+        os.close(descriptor)
 
 
 def _require_own(folder: Path) -> None:
     """Refuse a link, and a folder into which another user can put files."""
     found = folder.lstat()
-    ours = fcntl is None or found.st_uid == os.geteuid()
+    ours = not hasattr(os, "geteuid") or found.st_uid == os.geteuid()
     if not (ours and stat.S_ISDIR(found.st_mode)):
         raise FileError(f"{folder}: is a link or not your folder; choose another --output")
-
-
-def _lock(descriptor: int, shared: bool) -> None:
-    if fcntl is None:
-        return
-    try:
-        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise
-    except OSError:
-        pass  # The file system has no locks.
 
 
 def settle_manifest(

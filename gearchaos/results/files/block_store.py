@@ -115,9 +115,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
                     "continue it with --resume, or delete this folder"
                 )
         except BaseException:
-            if self._lock.new and self._lock.alone():
-                self._remove([LOCK])
-            self._lock.release()
+            self._end([LOCK] if self._lock.new and self._lock.alone() else [])
             raise
         # Partial files of other shards may be in use.
         if not shared:
@@ -131,9 +129,17 @@ class BlockStore(AbstractContextManager["BlockStore"]):
     def remove(self) -> None:
         """Remove the blocks, the folder if nothing else is in it, and release the lock."""
         # Only files of the store: the folder may hold files of the user.
-        self._remove([*self._names(), MANIFEST, LOCK])
+        self._end([*self._names(), MANIFEST, LOCK])
+
+    def _end(self, names: Sequence[str]) -> None:
+        """Remove some files, and the folder if it is empty then, and release the lock."""
+        if names:
+            self._remove(names)
         # Released last: files that appear from now on belong to another sweep.
         self._lock.release()
+        if names:
+            # Claims lie in the folder until then, and Windows keeps files that are open.
+            self._remove([LOCK] if os.name == "nt" else [])
 
     @property
     def own_lanes(self) -> int:
