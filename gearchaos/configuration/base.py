@@ -373,9 +373,9 @@ class Configuration(Tables):
             raise ConfigurationError([*fault_texts(faults, source), *causes])
         return self
 
-    # The source of a configuration does not matter.
+    # Neither its source nor what was derived from it so far matters.
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Configuration) and self.__dict__ == other.__dict__
+        return isinstance(other, Configuration) and dict(self) == dict(other)
 
     __hash__ = None  # type: ignore[assignment]
 

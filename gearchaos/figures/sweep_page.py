@@ -68,6 +68,10 @@ def bifurcation_page(
     FileError
         If stages are requested and the result has no labels of the motion.
 
+    Notes
+    -----
+    It has nine arguments, because each is an independent choice of whoever draws.
+
     Examples
     --------
     >>> page = figures.bifurcation_page(gearchaos.open_result("pan2021.h5"), stages=True)

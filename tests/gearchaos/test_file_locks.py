@@ -134,5 +134,5 @@ def test_a_sweep_runs_and_leaves_no_folder(system, tmp_path):
     for more, printed in (["--dry-run"], "memory: "), ([], "gears.h5\n"):
         run = {"cwd": tmp_path, "capture_output": True, "text": True, "timeout": HANGS}
         done = subprocess.run([*command, *more], **run)
-        assert done.returncode == 0 and printed in done.stdout, done.stderr
+        assert done.returncode == 0 and printed in done.stdout + done.stderr, done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["gears.h5", "gears.toml"]
