@@ -80,7 +80,8 @@ class DeclaredModel(Model):
 
 def parameters_of(lanes: type[LaneSystem]) -> tuple[str, ...]:
     """Return the names of the parameters of lanes, in their order."""
-    return tuple(field.name for field in fields(lanes))
+    shared = {field.name for field in fields(LaneSystem)}
+    return tuple(field.name for field in fields(lanes) if field.name not in shared)
 
 
 def _example_of(lanes: type[LaneSystem]) -> LaneSystem:

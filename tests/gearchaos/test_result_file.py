@@ -16,6 +16,7 @@ import pytest
 import xarray as xr
 
 from gearchaos.models.gear_pair.outputs import CATALOGUE, STATE_SUBJECTS
+from gearchaos.outputs.catalogue import CONTROL_PART, DIMENSION_PART
 from gearchaos.outputs.names import axis_name
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.reading.result import Result, open_result
@@ -372,4 +373,8 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
         fill = "" if variable.fill_value is None else str(variable.fill_value)
         described = (short.get(dims, dims), variable.dtype, fill.replace("nan", "NaN"))
         assert documented.pop(short.get(name, name)) == described
+    # Those of which no such result is made by hand, from the catalogue.
+    for output in (*DIMENSION_PART.outputs, *CONTROL_PART.outputs):
+        fill = "" if output.fill_value is None else "NaN"
+        assert documented.pop(output.name) == ("axes", output.dtype, fill)
     assert set(documented) == {"harmonic"}
