@@ -22,8 +22,9 @@ from bokeh.plotting import figure
 
 CLONE = Path(__file__).resolve().parent.parent
 SMALL = ("sweep.count=12", "integration.transient_periods=60", "integration.recorded_periods=40")
+SMALL += ("outputs.section_points=20",)
 JOB = ["sweep", str(CLONE / "sweeps" / "pan2021.toml"), "--quiet"]
-JOB += [word for key in (*SMALL, "outputs.section_points=20") for word in ("--set", key)]
+JOB += [word for key in SMALL for word in ("--set", key)]
 MACHINE = ["sweep", str(CLONE / "sweeps" / "two_masses.toml"), "--quiet", "--output", "two.h5"]
 MACHINE += [word for key in SMALL for word in ("--set", key)]
 COMMANDS = (
