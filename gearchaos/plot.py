@@ -21,7 +21,7 @@ The paths of the figures go to stdout. A figure that this command drew before is
 the command can be repeated; any other file of that name is kept unless --overwrite is given.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -194,16 +194,8 @@ def _plot(options: PlotOptions) -> None:
     pairs = zip(results, responses, strict=True)
     results = [in_units(one, options.units, over_time) for one, over_time in pairs]
     if any(responses):
-        flags = {
-            "--stages": options.stages,
-            "--lines": options.lines,
-            "--shares": options.shares,
-            "--control": options.control,
-            "--mark": options.mark,
-            "--branches": options.branches,
-            "--boundaries": options.boundaries,
-        }
-        _draws_alone("a response", options, flags)
+        refused = ("stages", "lines", "shares", "control", "mark", "branches", "boundaries")
+        _draws_alone("a response", options, *refused)
     make = _response_sheets if responses[0] else _sweep_sheets
     sheets = [sheet for one in options.one_by_one() for sheet in make(results, one)]
     if options.units == ("dimensionless" if responses[0] else "physical"):
@@ -252,17 +244,8 @@ def _plot_branches(options: PlotOptions) -> None:
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.files.branch_reader import read_branches
 
-    flags: dict[str, object] = {
-        "--stages": options.stages,
-        "--lines": options.lines,
-        "--shares": options.shares,
-        "--mark": options.mark,
-        "--at": options.at,
-        "--branches": options.branches,
-        "--boundaries": options.boundaries,
-        "--units": options.units == "physical",
-    }
-    _draws_alone("a file of branches", options, flags)
+    refused = ("stages", "lines", "shares", "mark", "at", "branches", "boundaries", "units")
+    _draws_alone("a file of branches", options, *refused)
     found = read_branches(options.results[0])
     width, between = options.width or SINGLE_COLUMN_MM, (options.low, options.high)
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": options.height}
@@ -283,18 +266,18 @@ def _plot_boundaries(options: PlotOptions) -> None:
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.files.boundary_reader import read_boundaries
 
-    flags: dict[str, object] = {
-        "--variable": options.variable,
-        "--stages": options.stages,
-        "--lines": options.lines,
-        "--shares": options.shares,
-        "--mark": options.mark,
-        "--at": options.at,
-        "--branches": options.branches,
-        "--boundaries": options.boundaries,
-        "--units": options.units == "physical",
-    }
-    _draws_alone("a file of boundaries", options, flags)
+    refused = (
+        "variable",
+        "stages",
+        "lines",
+        "shares",
+        "mark",
+        "at",
+        "branches",
+        "boundaries",
+        "units",
+    )
+    _draws_alone("a file of boundaries", options, *refused)
     found = read_boundaries(options.results[0])
     width, between = options.width or SINGLE_COLUMN_MM, (options.low, options.high)
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": options.height}
@@ -364,12 +347,15 @@ def _with_branches(
     return drawn
 
 
-def _draws_alone(page: str, options: PlotOptions, flags: Mapping[str, object]) -> None:
+def _draws_alone(page: str, options: PlotOptions, *refused: str) -> None:
     """Raise a FigureError for what only diagrams of sweeps support: several results, some flags.
 
-    ``flags`` are the values of these flags.
+    ``refused``: names of these flags without their dashes.
     """
-    faults = {flag: "have it" for flag, value in flags.items() if value}
+    given = {name: getattr(options, name) for name in refused}
+    if "units" in given:
+        given["units"] = given["units"] == "physical"
+    faults = {f"--{name}": "have it" for name, value in given.items() if value}
     faults |= {str(path): "are drawn over each other" for path in options.results[1:]}
     for fault, rule in faults.items():
         raise FigureError(
@@ -412,21 +398,14 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     ):
         if not chosen:
             continue
-        flags: dict[str, object] = {
-            "--variable": options.variable,
-            "--stages": options.stages,
-            "--lines": options.lines,
-            "--branches": options.branches,
-            "--boundaries": options.boundaries,
-        }
-        _draws_alone(f"a figure of {kind}", options, flags)
+        refused = ("variable", "stages", "lines", "branches", "boundaries")
+        _draws_alone(f"a figure of {kind}", options, *refused)
         return [(f"{name}_{kind}", partial(draw_page, results[0], between, width, height))]
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
         page = f"a map; --at {maps[0][0]}=VALUE makes a diagram of it"
-        flags = {"--stages": options.stages, "--lines": options.lines}
-        _draws_alone(page, options, flags | {"--branches": options.branches})
+        _draws_alone(page, options, "stages", "lines", "branches")
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         name += "_with_boundaries" if options.boundaries else ""
         return [(name, _with_boundaries(results[0], options, draw))]

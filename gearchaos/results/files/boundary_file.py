@@ -2,16 +2,13 @@
 
 import os
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
-import h5py
 import numpy as np
 
 from gearchaos.outputs.names import SECTION, SECTION_POINT, STATE
 from gearchaos.outputs.variable import Variable
 from gearchaos.records.boundary import BOUNDARY_ENDS, BOUNDARY_KINDS, POINT_KINDS, Boundary
-from gearchaos.results.files.atomic_file import append_checksum, replacing
 from gearchaos.results.files.branch_file import (
     complex_parts,
     joined,
@@ -21,10 +18,9 @@ from gearchaos.results.files.branch_file import (
     whole_numbers,
 )
 from gearchaos.results.files.result_file import (
-    CACHE_BYTES,
     CONVENTIONS,
-    Sink,
     create_all,
+    new_file,
     write_metadata,
 )
 
@@ -88,15 +84,9 @@ def write_boundaries(
         PARAMETERS: " ".join(one.name for one in found.parameters),
         FLANKS: "\n".join(_flanks(found)),
     }
-    with replacing(Path(path), overwrite=overwrite) as partial:
-        with (
-            Sink(partial) as sink,
-            h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
-        ):
-            write_metadata(file, facts)
-            create_all(file, _variables(found), {})
-            sink.check()
-        append_checksum(partial)
+    with new_file(path, overwrite=overwrite) as (file, _):
+        write_metadata(file, facts)
+        create_all(file, _variables(found), {})
 
 
 def _flanks(found: BoundarySet) -> list[str]:

@@ -3,22 +3,18 @@
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.outputs.names import SECTION, SECTION_POINT, STATE
 from gearchaos.outputs.variable import Variable
 from gearchaos.records.branch import BRANCH_ENDS, SPECIAL_KINDS, PeriodicBranch, SpecialPoint
-from gearchaos.results.files.atomic_file import append_checksum, replacing
 from gearchaos.results.files.result_file import (
-    CACHE_BYTES,
     CONVENTIONS,
-    Sink,
     create_all,
+    new_file,
     write_metadata,
 )
 
@@ -88,15 +84,9 @@ def write_branches(path: str | os.PathLike[str], found: BranchSet, overwrite: bo
         "parameter": found.parameter.name,
         FLANKS: "\n".join(_flanks(found)),
     }
-    with replacing(Path(path), overwrite=overwrite) as partial:
-        with (
-            Sink(partial) as sink,
-            h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
-        ):
-            write_metadata(file, facts)
-            create_all(file, _variables(found), {})
-            sink.check()
-        append_checksum(partial)
+    with new_file(path, overwrite=overwrite) as (file, _):
+        write_metadata(file, facts)
+        create_all(file, _variables(found), {})
 
 
 def _flanks(found: BranchSet) -> list[str]:

@@ -79,18 +79,34 @@ def write_result(
         If a block holds an array that belongs to no variable.
     """
     everything = [*variables, *_harmonics(parameters)]
+    with new_file(path, overwrite=overwrite, scratch=scratch) as (file, sink):
+        write_metadata(file, {**metadata, **own_metadata(lane_axes(variables))})
+        of_the_lanes = create_all(file, everything, parameters)
+        for first, last, arrays in blocks:
+            require_listed(arrays, [variable.name for variable in everything])
+            _write_lanes(of_the_lanes, first, last, arrays)
+            sink.check()
+            check()
+
+
+@contextmanager
+def new_file(
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    scratch: str | os.PathLike[str] | None = None,
+) -> Iterator[tuple[h5py.File, "Sink"]]:
+    """Open a file that appears complete, with its checksum, or not at all; see `write_result`.
+
+    Yields the file and what it is written to.
+    """
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
         with (
             Sink(partial) as sink,
             h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
-            write_metadata(file, {**metadata, **own_metadata(lane_axes(variables))})
-            of_the_lanes = create_all(file, everything, parameters)
-            for first, last, arrays in blocks:
-                require_listed(arrays, [variable.name for variable in everything])
-                _write_lanes(of_the_lanes, first, last, arrays)
-                sink.check()
-                check()
+            yield file, sink
+            sink.check()
         append_checksum(partial)
 
 
