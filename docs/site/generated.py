@@ -60,7 +60,8 @@ def output_rows(catalogue) -> Iterator[str]:
         subject = "/".join(SUBJECTS[kind.name] for kind in part.repeated_for)
         for output in part.outputs:
             name = output.name.replace("@", subject.replace("/COORDINATE_acceleration", ""))
-            wording = catalogue.long_names.get(output.name, output.long_name).replace("@", "it")
+            wording = catalogue.long_names.get(output.name, output.long_name)
+            wording = wording.replace("@", subject.partition("/")[0] or "mesh periods")
             fill = "" if output.fill_value is None else f"`{output.fill_value}`"
             dims = ", ".join(output.dims)
             values = ", ".join(f"{number} {word}" for number, word in enumerate(output.meanings))
@@ -96,9 +97,14 @@ def python_page() -> str:
 
     import gearchaos
     from gearchaos import errors, figures, iso1328
+    from gearchaos.outputs.variable import Variable
 
+    of_system = [inspect.signature(one) for one in vars(gearchaos.System).values() if callable(one)]
+    returned = [one.return_annotation for one in of_system]
+    tables = gearchaos.Result.to_dataframe, gearchaos.Result.to_xarray
     homes = {
         "gearchaos": [getattr(gearchaos, name) for name in gearchaos.__all__],
+        "What systems and results return": [*returned, Variable, *tables],
         "gearchaos.figures": vars(figures).values(),
         "gearchaos.iso1328": vars(iso1328).values(),
         "gearchaos.errors": vars(errors).values(),
@@ -128,12 +134,25 @@ def change_page() -> str:
     return re.sub(r"\]\((?!\w+:)(docs/)?", lambda at: "](../" if at[1] else "](../../", text)
 
 
+def contributing_page() -> str:
+    """Return the rules for contributors, with links as seen from their place among the pages."""
+    text = (CLONE / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    return re.sub(r"\]\((?!\w+:|#)(docs/)?", lambda at: "](../" if at[1] else "](../../", text)
+
+
+COPIES = {
+    CLONE / "CONTRIBUTING.md": "reference/contributing.md",
+    CLONE / "CHANGELOG.md": "reference/changes.md",
+}
+"""Pages of the site that show files beside the folder of the manual."""
+
 PAGES = {
     "reference/commands.md": command_page,
     "reference/keys.md": key_page,
     "reference/outputs.md": output_page,
     "reference/python.md": python_page,
     "reference/changes.md": change_page,
+    "reference/contributing.md": contributing_page,
 }
 
 
@@ -152,6 +171,9 @@ def on_page_markdown(markdown, page, config, files):
 
     def shown(link):
         target = Path(os.path.normpath(folder / link[2].partition("#")[0]))
+        if target in COPIES:
+            place = os.path.relpath(COPIES[target], Path(page.file.src_uri).parent)
+            return f"[{link[1]}]({place})"
         outside = not target.is_relative_to(config.docs_dir)
         return f"{link[1]} (`{target.relative_to(CLONE)}`)" if outside else link[0]
 
