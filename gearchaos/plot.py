@@ -326,8 +326,15 @@ def _with_branches(
         return draw
     from gearchaos.figures.branches import add_branches
     from gearchaos.results.files.branch_reader import read_branches
+    from gearchaos.results.reading.result import section_variables
 
     found, axis = read_branches(options.branches), results[0].axis
+    if options.variable is None and not any(map(section_variables, results)):
+        raise FigureError(
+            f"--branches {options.branches}: are drawn into the diagram of a section, which "
+            f"{options.results[0]} does not hold; name states in outputs.section and run the sweep "
+            "again, or plot the file of branches alone"
+        )
     if found.parameter.name != axis:
         raise FigureError(
             f"--branches {options.branches}: holds branches over {found.parameter.name}, and the "

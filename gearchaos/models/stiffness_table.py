@@ -25,7 +25,10 @@ MOST_HARMONICS = 200
 """Largest number of harmonics of a table. The kernels have no limit; a machine is compiled with
 every harmonic of every element, which takes 20 s more for 60 of them."""
 
-_UNIT = re.compile(r"(?<![A-Za-z])N *(?:/|_per_| per ) *\(?(um|µm|μm|mm|m)(?:[ _/*·]+(mm))?\b")
+_LENGTH = "um|µm|μm|mm|m"
+_UNIT = re.compile(
+    rf"(?<![A-Za-z])N *(?:/|_per_| per ) *\(? *({_LENGTH})(?:[ _/*·.]+({_LENGTH}))?\b *\)?"
+)
 _DEGREES = re.compile(r"deg|°", re.IGNORECASE)
 
 
@@ -165,9 +168,15 @@ def unit_of(heading: str) -> str:
     found = _UNIT.search(heading)
     if found is None:
         return ""
-    length = found[1].replace("µ", "u").replace("μ", "u")
-    unit = f"N/({length} mm)" if found[2] else f"N/{length}"
-    return unit if unit in (*IN_N_PER_UM, PER_WIDTH) else ""
+    in_brackets = heading[: found.start()].rstrip().endswith(("[", "("))
+    if in_brackets and not re.match(r" *[\])]|$", heading[found.end() :]):
+        # More follows: this is another unit.
+        return ""
+    lengths = [one.replace("µ", "u").replace("μ", "u") for one in found.groups() if one]
+    if sorted(lengths) == ["mm", "um"]:
+        return PER_WIDTH
+    unit = f"N/{lengths[0]}"
+    return unit if len(lengths) == 1 and unit in IN_N_PER_UM else ""
 
 
 def tables_in(tables: Any, path: str = "") -> Iterator[tuple[str, StiffnessTable]]:

@@ -23,6 +23,12 @@ CERTAIN = 6.0
 CHAOTIC_GROWTH = 2.0
 """Logarithm of growth over the record above which a disturbance grows."""
 
+FEWEST_TO_GROW = 32
+"""Fewest section points that show, by their first and last quarter, that a motion grows.
+
+The largest of a few points of a bounded motion differs by chance as much as in growth.
+"""
+
 NEUTRAL_GROWTH = 1.0
 """Logarithm of growth or decay over the record up to which a disturbance is neutral."""
 
@@ -221,6 +227,7 @@ def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
     first, last = section[:, :quarter], section[:, -quarter:]
     ratio = np.max(np.abs(last), axis=(1, 2)) / np.max(np.abs(first), axis=(1, 2))
     grows = chaotic & (np.log(ratio) > exponent * (section.shape[1] - quarter) / 2.0)
+    grows &= section.shape[1] >= FEWEST_TO_GROW
     quasi_periodic = torus & neutral & (section.shape[1] >= 2 * POINTS_NEEDED)
     quasi_periodic[quasi_periodic] = halves_differ_by(section[quasi_periodic]) <= AGREEMENT
     motion = np.where(chaotic, CHAOTIC, np.where(quasi_periodic, QUASI_PERIODIC, UNRESOLVED))

@@ -283,6 +283,18 @@ def test_faults_are_one_sentence(files, arguments, words):
         assert word in done.err
 
 
+def test_branches_are_not_drawn_into_the_chart_of_exponents(files):
+    folder, _ = files
+    sets = [*TORSION, "sweep.count=3", "outputs.section=[]"]
+    words = [word for one in sets for word in ("--set", one)]
+    swept = run("sweep", SWEEPS / "pan2021_first.toml", "-o", "bare.h5", *words, cwd=folder)
+    assert swept.code == 0, swept.err
+    done = run("plot", "bare.h5", "--branches", "sweep_branches.h5", cwd=folder)
+    assert done.code == 2
+    assert "bare.h5 does not hold; name states in outputs.section" in done.err
+    assert not (folder / "bare.png").exists()
+
+
 def test_a_damaged_file_is_refused(files):
     folder, _ = files
     whole = bytearray((folder / "sweep_branches.h5").read_bytes())

@@ -7,6 +7,7 @@ from gearchaos.records.label import (
     AGREEMENT,
     CHAOTIC,
     DIVERGED,
+    GROWS,
     PERIODIC,
     QUASI_PERIODIC,
     UNRESOLVED,
@@ -234,3 +235,11 @@ def test_chaos_is_doubted_as_long_as_it_is_within_six_standard_errors(errors, do
 def test_without_an_exponent_a_longer_record_would_not_show_chaos():
     without = record(circle(GOLDEN / POINTS))._replace(growth=np.zeros((1, 0)))
     assert not doubtful(without.growth, label(without)).any()
+
+
+def test_few_points_do_not_show_that_a_motion_grows():
+    """Three points of bounded chaos, as teeth with errors give for each lane, lie far apart."""
+    few = np.array([[0.33], [0.9], [1.36]])
+    assert labelled(few, np.full(3, 0.8))[0] == CHAOTIC
+    grown = np.exp(0.3 * np.arange(40.0))[:, np.newaxis]
+    assert labelled(grown, np.full(40, 0.3))[0] == GROWS

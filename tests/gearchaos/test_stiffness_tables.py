@@ -66,6 +66,13 @@ def test_the_series_is_the_shortest_one_within_the_bound():
         ("mesh stiffness in N/m", "N/m"),
         ("k [N/(um mm)]", "N/(um mm)"),
         ("k_N_per_um_mm", "N/(um mm)"),
+        ("c_gamma [N/(mm·µm)]", "N/(um mm)"),
+        ("c [N/(mm um)]", "N/(um mm)"),
+        ("c [N/mm/um]", "N/(um mm)"),
+        # Only the beginning of each is a unit that is known.
+        ("c [N/(um cm)]", ""),
+        ("c [N/(mm mm)]", ""),
+        ("c [N/mm^2]", ""),
         ("k", ""),
     ],
 )
