@@ -329,6 +329,9 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
         yield f"{boundary.below:.8g} to {boundary.above:.8g}: {between}{jumps}"
         if boundary.loss:
             yield f"    {boundary.loss}"
+        if boundary.elsewhere:
+            yield f"    the orbit is lost at {boundary.lost_at:.8g}, not in this interval: here the"
+            yield "    motion changes to a coexisting one, or settles too slowly for its label"
         if not math.isnan(abs(boundary.multiplier)):
             pair = boundary.multiplier.imag != 0.0
             yield f"    multiplier {boundary.multiplier if pair else boundary.multiplier.real:.4f}"

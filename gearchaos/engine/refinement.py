@@ -1,9 +1,9 @@
 """Boundaries between the stages of a sweep, located more precisely than by its lanes."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -53,6 +53,9 @@ class Boundary(NamedTuple):
         Floquet multiplier at the loss, NaN without one.
     direction : str
         Direction in which a carried sweep jumps at the boundary, otherwise empty.
+    lost_at : float
+        Value of the parameter at which the orbit loses stability; NaN where it does not, or where
+        this is the boundary itself.
     """
 
     below: float
@@ -62,6 +65,13 @@ class Boundary(NamedTuple):
     loss: str = ""
     multiplier: complex = complex("nan")
     direction: str = ""
+    lost_at: float = math.nan
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether the orbit next to the boundary is lost elsewhere, so that the motion jumps."""
+        width = self.above - self.below
+        return abs(self.lost_at - (self.below + self.above) / 2.0) > 1.5 * width
 
 
 def refined_boundaries(
@@ -93,7 +103,7 @@ def refined_boundaries(
             below[wide[up]], above[wide[down]] = tried[number, up], tried[number, down]
     losses = _losses(config, below, above, spacing)
     return [
-        Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
+        Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], **loss)
         for one, other, loss in zip(below, above, losses, strict=True)
     ]
 
@@ -221,22 +231,28 @@ def _computed(run: RunPlan, values: Mapping[str, Floats]) -> Array:
 
 def _losses(
     config: Configuration, below: Array, above: Array, spacing: Floats
-) -> list[tuple[str, complex]]:
-    """Follow the orbits below each boundary upwards and those above it downwards."""
+) -> list[dict[str, Any]]:
+    """Follow the orbits below each boundary upwards and those above it downwards.
+
+    Returns how, with which multiplier and where one of them is lost, by the fields of `Boundary`.
+    """
     # Labels change slightly before or after a bifurcation: follow one lane further.
     ends = above["value"] + spacing, below["value"] - spacing
     edges = np.concatenate([below, above])
     # Both ways side by side: few lanes take as long as many.
     followed = _followed(config, edges, np.concatenate(ends))
-    losses = []
+    places = (followed.stable_value + followed.beyond_value) / 2.0
+    losses: list[dict[str, Any]] = []
     for number in range(spacing.size):
-        sides = [
-            (followed.loss[lane], complex(followed.multiplier[lane]))
-            for lane in (number, spacing.size + number)
-            if edges["period"][lane] > 0
-        ]
-        loss, multiplier = min(sides, key=itemgetter(0), default=(None, complex("nan")))
-        losses.append(("" if loss is None else STABILITY_LOSS_TEXTS[loss], multiplier))
+        sides = [n for n in (number, spacing.size + number) if edges["period"][n] > 0]
+        losses.append({})
+        if sides:
+            lane = min(sides, key=lambda side: int(followed.loss[side]))
+            kind = followed.loss[lane]
+            losses[-1]["loss"] = STABILITY_LOSS_TEXTS[kind]
+            losses[-1]["multiplier"] = complex(followed.multiplier[lane])
+            if kind not in NO_LOSS:
+                losses[-1]["lost_at"] = float(places[lane])
     return losses
 
 

@@ -69,6 +69,7 @@ def test_boundaries_are_refined_and_the_period_doubling_is_reported(folder):
     assert 0.0 < doubling["above"] - doubling["below"] <= 0.002
     # Newton's method and the multipliers alone put it at 10.268.
     assert doubling["below"] <= 10.268 <= doubling["above"]
+    assert doubling["lost_at"] == pytest.approx(10.268, abs=1e-3)
     assert doubling["label_below"] == "period 1"
     assert doubling["loss"].startswith("period doubling")
     assert doubling["multiplier"][0] == pytest.approx(-1.0, abs=0.02)
