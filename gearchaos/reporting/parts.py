@@ -32,9 +32,11 @@ from gearchaos.results.reading.listed import (
     list_jumps,
     list_shares,
     list_stages,
+    unit_of_axis,
 )
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes, stage_table
+from gearchaos.results.reading.tables import unit_text
 
 MOST_SLICES = 6
 """Most slices of a result, or lanes of a response, that a report shows."""
@@ -49,6 +51,9 @@ SHARES = "Shares of motions among all gear pairs and starts at each value, and o
 BASINS = "Basins of attraction: the attractor that each start leads to"
 BASIN_SHARES = "Share of the starts that leads to each attractor"
 """Captions of figures."""
+
+LARGEST_LOADS = "load_factor_largest", "mesh_force_largest", "force_largest"
+"""Beginnings of the names of variables that are drawn and listed as loads."""
 
 Pages = Iterator[tuple[str, Callable[[], Page]]]
 """Captions of figures, and the functions that draw them."""
@@ -133,6 +138,8 @@ def _pages(one: Result, found: Basins | None) -> Pages:
     """Yield the figures of a slice: map, basins, shares, diagram."""
     if len(swept_axes(one)) > 1:
         yield MAP, partial(map_page, one)
+        for name in _largest_loads(one):
+            yield f"Map: {one.variables[name].long_name}", partial(map_page, one, name)
         return
     several = any(axis in REPEATS for axis in one.axes)
     if found is not None and (len(found.grid) == 2 or found.values.size > 1):
@@ -143,10 +150,34 @@ def _pages(one: Result, found: Basins | None) -> Pages:
     if one[one.axis].size > 1 or not several:
         stages = LABELS[0] in one and DIRECTION not in one.axes
         yield DIAGRAM, partial(bifurcation_page, one, stages=stages)
+        for name in _largest_loads(one):
+            wording = one.variables[name].long_name
+            yield f"{wording[0].upper()}{wording[1:]}", partial(bifurcation_page, one, name)
+
+
+def _largest_loads(one: Result) -> list[str]:
+    """Return the variables of the largest loads that a slice holds."""
+    return [name for name in one.variables if name.startswith(LARGEST_LOADS)]
+
+
+def _load_table(one: Result) -> Listed:
+    """List each of the largest loads: its largest value, and where it lies."""
+    axes = swept_axes(one)
+    headings = ["quantity", "unit", "largest [unit]"]
+    headings += [f"at {name} [{unit_of_axis(one, name)}]" for name in axes]
+    rows = []
+    for name in _largest_loads(one):
+        variable, values = one.variables[name], one.lanes(name)
+        if np.isfinite(values).any():
+            lane = int(np.nanargmax(values))
+            places = [float(one.along(axis)[lane]) for axis in axes]
+            rows.append([variable.long_name, unit_text(variable), float(values[lane]), *places])
+    return Listed(headings, rows)
 
 
 def _tables(one: Result, found: Basins | None) -> Iterator[tuple[str, Listed]]:
-    """Yield captions and tables of a slice: stages, jumps, directions, shares, basins."""
+    """Yield captions and tables of a slice: loads, stages, jumps, directions, shares, basins."""
+    yield "Largest loads", _load_table(one)
     if LABELS[0] not in one or len(swept_axes(one)) > 1:
         return
     several = any(axis in REPEATS for axis in one.axes)

@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import gearchaos
@@ -30,7 +31,7 @@ GRID = (
 )
 KINDS = {
     "sweep": (*PLAIN, f"title='{HOSTILE}'"),
-    "carried": (*PLAIN, "start.carry='both'"),
+    "carried": (*PLAIN, "start.carry='both'", "outputs.loads=true"),
     "map": (*PLAIN, LOAD),
     "basins": (PLAIN[0], *GRID),
 }
@@ -103,7 +104,8 @@ def shown(text: str) -> str:
 @pytest.mark.parametrize("kind", [*KINDS, "response", "shares"])
 def test_a_page_loads_nothing_and_has_figures_configuration_and_versions(kind, folder, capsys):
     page = report(folder / f"{kind}.h5", capsys)
-    assert len(page.pictures) == {"response": 2, "shares": 2}.get(kind, 1)
+    # The carried sweep also has one for the load factor, and one for each force.
+    assert len(page.pictures) == {"response": 2, "shares": 2, "carried": 4}.get(kind, 1)
     for tag, given in page.tags:
         assert tag not in ("script", "link", "iframe", "object", "base"), tag
         assert not {name for name in given if name.startswith("on")}
@@ -163,6 +165,23 @@ def test_a_carried_sweep_has_stages_of_both_directions(folder, capsys):
     captions = report(folder / "carried.h5", capsys).text
     assert "Stages over pitch_error, upwards" in captions
     assert "Stages over pitch_error, downwards" in captions
+
+
+def test_loads_are_drawn_and_the_largest_of_each_is_listed(folder, capsys):
+    result = gearchaos.open_result(folder / "carried.h5")
+    page = report(folder / "carried.h5", capsys)
+    loads = [
+        name
+        for name in result.variables
+        if name.startswith(("load_factor_largest", "mesh_force_largest"))
+    ]
+    assert len(loads) == 3
+    for name in loads:
+        values, wording = result[name], result.variables[name].long_name
+        place = result["pitch_error"][np.unravel_index(np.argmax(values), values.shape)[0]]
+        (row,) = [one for one in page.rows if one and one[0] == wording]
+        assert [float(one) for one in row[2:]] == pytest.approx([values.max(), place], rel=1e-5)
+        assert wording[1:] in page.text
 
 
 def test_the_glossary_has_the_words_of_the_page(folder, capsys):
