@@ -1,5 +1,6 @@
 """Integrate a batch: split lanes into blocks, run the blocks in parallel, return arrays."""
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -53,7 +54,7 @@ def _scene_of(flags: Any, clearance: bool, plan: Plan, feedback: Feedback | None
     switches = model.switches(flags)
     resolved = clearance and (plan.resolved or method.always_resolved)
     wanted = [one for one in RECORDERS if one.wanted(plan, resolved)]
-    return Scene(
+    scene = Scene(
         model=flags,
         method=method.flags(),
         recorders=Recorded(*(flag(one in wanted) for one in RECORDERS)),
@@ -67,6 +68,7 @@ def _scene_of(flags: Any, clearance: bool, plan: Plan, feedback: Feedback | None
         control=flag(feedback),
         feedback=feedback,
     )
+    return replace(scene, stops=flag(method.stops(scene)))
 
 
 def integrate(
@@ -182,7 +184,6 @@ def _integrate_share(
         share.progress,
         chosen,
         _turns(orders, share.steps),
-        plan.frame,
     )
     control = _actuation(system, step, plan, outcome.inputs)
     schedule = Schedule(
@@ -196,13 +197,25 @@ def _integrate_share(
         anew = share.order[np.repeat(share.progress[:, 0] == 0.0, share.blocks[:, 1])]
         outcome.status[anew], outcome.diverged_period[anew] = Status.OK, -1
     tables, next_block = system.tables(plan.steps_per_period), np.zeros(1, dtype=np.intp)
-    _integrate_blocks(
-        get_num_threads(), next_block, batch, tables, schedule, outcome, control, scene
-    )
+    used = _used(batch, scene), tables, schedule, _used(outcome, scene)
+    _integrate_blocks(get_num_threads(), next_block, *used, control, scene)
     if share.maps.size:
         unmapped = np.isnan(share.maps[share.blocks[:, 3]])
         lost = np.repeat(unmapped, share.blocks[:, 1])
         outcome.status[share.order[lost]] = Status.TOO_FAST
+
+
+def _used(arrays: Any, scene: Scene) -> Any:
+    """Return a `Batch` or an `Outcome` with None for the arrays that a scene does not use.
+
+    An array among the arguments takes time to compile in every function that passes it on.
+    """
+    # The controllers have the inputs themselves.
+    unused = {"inputs"} if scene.stops else {"inputs", "lacked", "progress"}
+    for one in RECORDERS:
+        if not getattr(scene.recorders, one.name):
+            unused.update(one.arrays)
+    return arrays._replace(**dict.fromkeys(unused.intersection(arrays._fields)))
 
 
 def _actuation(system: LaneSystem, step: Floats, plan: Plan, inputs: Floats) -> Actuation | Floats:

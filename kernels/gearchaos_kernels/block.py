@@ -86,8 +86,6 @@ class Batch(NamedTuple):
         Rows of the states whose extremes are recorded, then the row of the observed signal.
     turns : array, shape (lanes, orders, 2)
         Cosine and sine of the phase by which a mesh order advances in a step.
-    frame : bool
-        See `Plan`.
     """
 
     coefficients: NDArray[np.float64]
@@ -102,7 +100,6 @@ class Batch(NamedTuple):
     progress: NDArray[np.float64]
     chosen: NDArray[np.intp]
     turns: NDArray[np.float64]
-    frame: bool
 
 
 @part
@@ -116,18 +113,18 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
     first, lanes, steps, maps_at = about[0], about[1], about[2], about[3]
     recorded_periods = about[4]
     memory = aligned_memory(rows(scene).total + plan.more_rows)
-    lacked = batch.lacked[first : first + lanes]
+    lacked, progress = stops_of(number_of_block, batch, scene)
     given = StepInputs(tables, batch.maps, workspace(scene), about[5:], lacked)
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     substeps = steps // plan.steps_per_period
     interval = begin(memory, block, batch, given, plan.first_period, scene)
     periods = plan.transient_periods + recorded_periods
-    if any_stopped(lacked):
+    if any_stopped(lacked, scene):
         return
-    progress = batch.progress[number_of_block : number_of_block + 1]
     for period in range(resumed(memory, block, progress, given, scene), periods):
-        keep_progress(memory, block, progress, period, scene)
+        if scene.stops is not None:
+            keep_progress(memory, block, progress, period, scene)
         recorded = period - plan.transient_periods
         if scene.control is not None:
             act(memory, block, period, batch, control, given, scene)
@@ -139,7 +136,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
             if scene.resolved is not None:
                 if suspects > 0:
                     resolve(memory, lanes, at, given, scene)
-                    if any_stopped(lacked):
+                    if any_stopped(lacked, scene):
                         return
             clock = Clock(period, number, steps, substeps, recorded, periods - 1 - period)
             record_step(memory, block, clock, records, scene)
@@ -155,8 +152,22 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
 
 
 @scalar
-def any_stopped(lacked):
+def stops_of(number, batch, scene):
+    """Return the parts of ``lacked`` and ``progress`` of a block, None if its method never stops.
+
+    See `Share`.
+    """
+    if scene.stops is None:
+        return None, None
+    first, lanes = batch.blocks[number, 0], batch.blocks[number, 1]
+    return batch.lacked[first : first + lanes], batch.progress[number : number + 1]
+
+
+@scalar
+def any_stopped(lacked, scene):
     """Return whether some lane of a block lacks maps."""
+    if scene.stops is None:
+        return False
     stopped = 0
     for number in lacked:
         stopped += 1 if number >= 0 else 0
@@ -169,6 +180,8 @@ def resumed(memory, block, progress, given, scene):
 
     ``progress``, shape (1 or 0, numbers): its row of `Share.progress`, if there is one.
     """
+    if scene.stops is None:
+        return 0
     if progress.shape[0] == 0:
         return 0
     period = int(progress[0, 0])

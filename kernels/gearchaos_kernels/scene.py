@@ -48,6 +48,8 @@ class Scene:
         What the loop contains of the controller, see `control`.
     traced : True or None
         Whether the method follows forces and observed signals along every step.
+    stops : True or None
+        Whether the method stops a block whose lanes lack maps, and continues it later.
     """
 
     model: Any
@@ -62,6 +64,7 @@ class Scene:
     control: Any = None
     feedback: Any = None
     traced: Any = None
+    stops: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""

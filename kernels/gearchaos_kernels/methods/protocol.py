@@ -61,6 +61,8 @@ class Method:
     traces : bool
         Whether the method follows forces and observed signals along every step by itself, and
         accumulates them in the rows `recorders.loads.accumulated_of`.
+    stops : callable
+        ``stops(scene)``: whether blocks stop where lanes lack maps, see `Share.lacked`.
     rows : callable
         ``rows(scene)``: rows of a block that the method uses for itself.
     prepare : callable
@@ -108,6 +110,7 @@ class Method:
     flags: Any
     always_resolved: bool
     traces: bool
+    stops: Callable[[Scene], bool]
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene, Integers], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]

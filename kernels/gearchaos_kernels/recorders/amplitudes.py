@@ -137,6 +137,7 @@ AMPLITUDES = Recorder(
     name="amplitudes",
     wanted=lambda plan, _resolved: bool(plan.states or plan.orders),
     rows=lambda _scene: 0,
+    arrays=("extremes", "amplitudes", "chosen", "turns"),
     reads_before=True,
     begin=begin,
     step=step,

@@ -65,6 +65,7 @@ CONTACT = Recorder(
     name="contact",
     wanted=lambda plan, resolved: plan.contact and resolved,
     rows=rows,
+    arrays=("contact",),
     crossing=crossing,
     end_period=end_period,
     finish=finish,

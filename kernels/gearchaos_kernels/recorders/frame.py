@@ -9,6 +9,7 @@ import math
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.rows import STRIDE, rows
+from gearchaos_kernels.recorders.protocol import Recorder
 
 SMALLEST_RESOLVED = 1e-8
 """Smallest share of a tangent vector that must remain after orthogonalisation."""
@@ -21,14 +22,14 @@ MOST_PASSES = 3
 
 
 @part
-def orthonormalise(memory, lane_at, recorded, records, scene):
+def orthonormalise(memory, first_row, lane_at, clock, records, scene):
     """Orthonormalise a frame when the growth of its last lane in a period has been written."""
     batch, growth = records.batch, records.outcome.growth
     scale = batch.scales[lane_at.number]
     size = scale.shape[0]
     if (lane_at.slot + 1) % size != 0:
         return
-    begin = lane_at.slot + 1 - size
+    begin, recorded = lane_at.slot + 1 - size, clock.recorded
     resolved = True
     for number in range(size):
         left = orthogonalise(memory, begin, number, scale, scene)
@@ -83,3 +84,11 @@ def replace_direction(memory, begin, number, scale, scene):
             memory[at] = 1.0 / scale[column] if column == axis else 0.0
         if orthogonalise(memory, begin, number, scale, scene) ** 2 * scale.shape[0] > 0.5:
             return
+
+
+FRAME = Recorder(
+    name="frame",
+    wanted=lambda plan, _resolved: plan.frame,
+    rows=lambda _scene: 0,
+    end_period=orthonormalise,
+)

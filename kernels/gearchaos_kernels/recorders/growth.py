@@ -4,7 +4,6 @@ import math
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.rows import STRIDE, rows
-from gearchaos_kernels.recorders.frame import orthonormalise
 from gearchaos_kernels.recorders.protocol import Recorder
 
 
@@ -15,8 +14,6 @@ def end_period(memory, first_row, lane_at, clock, records, scene):
     if clock.recorded >= 0:
         records.outcome.growth[lane_at.number, clock.recorded] = memory[row]
     memory[row] = 0.0
-    if records.batch.frame:
-        orthonormalise(memory, lane_at, clock.recorded, records, scene)
 
 
 @scalar
@@ -31,6 +28,7 @@ GROWTH = Recorder(
     name="growth",
     wanted=lambda plan, _resolved: plan.tangent,
     rows=lambda _scene: 0,
+    arrays=("growth",),
     end_period=end_period,
     stop=stop,
 )

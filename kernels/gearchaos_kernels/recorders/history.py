@@ -54,6 +54,7 @@ HISTORY = Recorder(
     name="history",
     wanted=lambda plan, _resolved: plan.history_periods > 0,
     rows=lambda _scene: 0,
+    arrays=("history",),
     begin=begin,
     step=step,
     stop=stop,

@@ -249,6 +249,7 @@ LOADS = Recorder(
     name="loads",
     wanted=lambda plan, _resolved: plan.loads or plan.records_steps,
     rows=rows,
+    arrays=("loads",),
     reads_before=True,
     begin=begin,
     step=step,

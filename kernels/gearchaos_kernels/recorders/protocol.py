@@ -83,6 +83,9 @@ class Recorder:
         scene resolves crossings.
     rows : callable
         ``rows(scene)``: rows of a block that the recorder uses.
+    arrays : tuple of str
+        Names of the arrays of `Outcome` and `Batch` that only this recorder uses. A compiled loop
+        without the recorder gets None in their place.
     reads_before : bool
         Whether it reads the state before a step.
     begin : compiled function, optional
@@ -107,6 +110,7 @@ class Recorder:
     name: str
     wanted: Callable[..., bool]
     rows: Callable[[Scene], int]
+    arrays: tuple[str, ...] = ()
     reads_before: bool = False
     begin: Any = None
     step: Any = None
@@ -143,11 +147,15 @@ finish_record = Interface("recorders", "finish")
 
 
 def _then_block(first: Any, first_row: int, rest: Any) -> Any:
-    """Return a function that calls the one of a recorder, then that of the other recorders."""
+    """Return a function that calls the one of a recorder, then that of the other recorders.
+
+    ``rest`` is None if there are no others.
+    """
 
     def of_block(memory, block, clock, records, scene):
         first(memory, first_row, block, clock, records, scene)
-        rest(memory, block, clock, records, scene)
+        if rest is not None:
+            rest(memory, block, clock, records, scene)
 
     return of_block
 
@@ -157,7 +165,8 @@ def _then_crossing(first: Any, first_row: int, rest: Any) -> Any:
 
     def crossing(memory, slot, crossing, lane, scene):
         first(memory, first_row, slot, crossing, lane, scene)
-        rest(memory, slot, crossing, lane, scene)
+        if rest is not None:
+            rest(memory, slot, crossing, lane, scene)
 
     return crossing
 
@@ -167,7 +176,8 @@ def _then_lane(first: Any, first_row: int, rest: Any) -> Any:
 
     def of_lane(memory, lane_at, clock, records, scene):
         first(memory, first_row, lane_at, clock, records, scene)
-        rest(memory, lane_at, clock, records, scene)
+        if rest is not None:
+            rest(memory, lane_at, clock, records, scene)
 
     return of_lane
 
@@ -182,7 +192,8 @@ _THEN = {
 }
 
 
-def _nothing_of_five(_a, _b, _c, _d, _e):
+@scalar
+def _nothing(_a, _b, _c, _d, _e):
     """Do nothing; all functions of recorders, once combined, have five arguments."""
 
 
@@ -211,10 +222,10 @@ class Recorders:
 
     def function(self, name: str, scene: Scene) -> Any:
         """Return a compiled function that calls the one of each recorder in turn."""
-        called = scalar(_nothing_of_five)
+        called = None
         for one in reversed(self.of(scene)):
             function = getattr(one, name)
             if function is not None:
                 at = self.first_row(one.name, scene)
                 called = scalar(_THEN[name](function, at, called))
-        return called
+        return called or _nothing

@@ -30,6 +30,7 @@ SECTION = Recorder(
     name="section",
     wanted=lambda _plan, _resolved: True,
     rows=lambda _scene: 0,
+    arrays=("section",),
     end_period=end_period,
     stop=stop,
 )

@@ -51,7 +51,7 @@ def cross_together(memory, slots, at, given, scene):
     for n in range(lanes):
         vectors.copy_lane(memory, slots[n], aside, n, scene)
         aside[aside_rows(scene).after * STRIDE + n] = -1.0
-    if place.on_demand:
+    if scene.stops is not None:
         share_maps(aside, lanes, scene)
     crossings, left = 0, lanes
     while left > 0 and crossings < MOST_CROSSINGS:
@@ -63,7 +63,7 @@ def cross_together(memory, slots, at, given, scene):
             if at.recorded:
                 trace_to_crossing(aside, maps, maps_at, scene)
         cross_over(aside, scene)
-        if place.on_demand:
+        if scene.stops is not None:
             find_maps_of(aside, slots, given, scene)
         for n in range(lanes):
             record_crossing_of(memory, slots[n], aside, n, at, scene)
@@ -81,7 +81,7 @@ def cross_together(memory, slots, at, given, scene):
             copy_rows(aside, n, memory, slots[n], rows(scene).tangent, place.states)
         if aside[rows(scene).suspect * STRIDE + n] != 0.0:
             give_up(memory, slots[n], maps, maps_at, scene)
-        if place.on_demand:
+        if scene.stops is not None:
             enter(memory, slots[n], given, scene)
 
 

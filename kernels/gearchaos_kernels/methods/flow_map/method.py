@@ -107,6 +107,7 @@ FLOW_MAP = Method(
     flags=FlowMap,
     always_resolved=True,
     traces=True,
+    stops=lambda scene: bool(layout_of(scene).on_demand),
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,

@@ -63,7 +63,7 @@ def begin_lane(memory, slot, lane, given, scene):
         store_offsets(memory, slot, lane, branches, scene)
     else:
         store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
-        if place.on_demand:
+        if scene.stops is not None:
             enter(memory, slot, given, scene)
 
 
@@ -101,7 +101,7 @@ def store_offsets(memory, slot, lane, branches, scene):
 @scalar
 def maps_on(memory, slot, maps_at, scene):
     """Return where the maps for the branches of a lane begin, among the maps of a step."""
-    if layout(scene).on_demand:
+    if scene.stops is not None:
         offset = int(memory[method_rows(scene).maps * STRIDE + slot])
     else:
         offset = number_of(read_branches(memory, slot, scene), scene) * layout(scene).size

@@ -144,6 +144,7 @@ RK4 = Method(
     flags=Rk4,
     always_resolved=False,
     traces=False,
+    stops=lambda _scene: False,
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,
