@@ -1,8 +1,8 @@
-"""Pages of the manual that are made from the program when the site is built, and the links out.
+"""Pages of the manual that are made when the site is built, and the links out.
 
-A hook of MkDocs. The pages are those of the commands, the keys, the outputs, the public names and
-the changes. A link from a page to a file of the clone that is no page is shown as its path, and
-equations become MathML.
+A hook of MkDocs. The pages of the commands, the keys, the outputs, the public names and the changes
+are made from the program, those of the tutorials from notebooks. A link from a page to a file of
+the clone that is no page is shown as its path, and equations become MathML.
 """
 
 import importlib
@@ -156,17 +156,30 @@ PAGES = {
 }
 
 
+def notebook_pages() -> Iterator[tuple[str, str | bytes]]:
+    """Yield path and content of the page of every notebook, and of its pictures."""
+    from nbconvert import MarkdownExporter
+
+    for notebook in sorted((CLONE / "docs" / "tutorials").glob("*.ipynb")):
+        unique = {"unique_key": notebook.stem}
+        page, resources = MarkdownExporter().from_filename(str(notebook), resources=unique)
+        yield f"tutorials/{notebook.stem}.md", page
+        yield from ((f"tutorials/{name}", data) for name, data in resources["outputs"].items())
+
+
 def on_files(files, config):
-    """Add the pages that are made from the program."""
+    """Add the pages that are made from the program and from notebooks."""
     from mkdocs.structure.files import File
 
-    for path, made in PAGES.items():
-        files.append(File.generated(config, path, content=made()))
+    made = ((path, page()) for path, page in PAGES.items())
+    for path, content in (*made, *notebook_pages()):
+        files.append(File.generated(config, path, content=content))
     return files
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Show links to files of the clone that are no pages as their paths."""
+    """Link to the pages of notebooks; show links to files that are no pages as their paths."""
+    markdown = re.sub(r"(\]\((?!\w+:)[^)\s#]+)\.ipynb\b", r"\1.md", markdown)
     folder = (Path(config.docs_dir) / page.file.src_uri).parent
 
     def shown(link):
