@@ -273,6 +273,7 @@ class _BoundarySearch:
         parameters = tuple(named[known.axis_name(one)] for one in self.over.parameters)
         facts = {
             "title": run.config.title,
+            "model": run.config.kind,
             "effects": " ".join(run.config.scene.effects),
             "method": run.config.integration.method,
             "steps_per_period": run.plan.steps_per_period,

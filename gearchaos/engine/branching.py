@@ -253,6 +253,7 @@ def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
     quantities = tuple(one for one in variables_of(run) if one.name in of_orbits)
     facts = {
         "title": run.config.title,
+        "model": run.config.kind,
         "effects": " ".join(run.config.scene.effects),
         "method": run.config.integration.method,
         "steps_per_period": run.plan.steps_per_period,
@@ -299,7 +300,8 @@ def flank_name(run: RunPlan, number: int) -> str:
     if number < 0:
         return ""
     element, back = divmod(number, 2)
-    return f"{run.elements[element]}, {'back' if back else 'driving'} flank"
+    flank = f"{'back' if back else 'driving'} flank"
+    return f"{run.elements[element]}, {run.lanes.model.catalogue.worded(flank)}"
 
 
 def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[str, Floats]:
