@@ -62,11 +62,26 @@ def output_rows(catalogue) -> Iterator[str]:
             name = output.name.replace("@", subject.replace("/COORDINATE_acceleration", ""))
             wording = catalogue.long_names.get(output.name, output.long_name)
             wording = wording.replace("@", subject.partition("/")[0] or "mesh periods")
+            wording = catalogue.worded(wording)
             fill = "" if output.fill_value is None else f"`{output.fill_value}`"
             dims = ", ".join(output.dims)
             values = ", ".join(f"{number} {word}" for number, word in enumerate(output.meanings))
             meaning = f"{wording} ({values})" if values else wording
             yield f"| `{name}` | ({dims}) | {output.dtype} | {fill} | {meaning} | {part.when} |"
+
+
+def code_table() -> str:
+    """Return the table of the codes of all flags and their words."""
+    from gearchaos.engine.kept import MEANINGS
+    from gearchaos.outputs.catalogue import CONTACTS, NO_CONTACT
+
+    rows = MEANINGS | {"contact_@": CONTACTS}
+    lines = ["| variable | codes |", "|---|---|"]
+    for name, words in rows.items():
+        codes = [f"{code} `{'_'.join(word.split())}`" for code, word in enumerate(words)]
+        codes += [f"{NO_CONTACT} no value"] if words is CONTACTS else []
+        lines.append(f"| `{name.replace('@', 'ELEMENT')}` | {', '.join(codes)} |")
+    return "\n".join(lines)
 
 
 def output_page() -> str:
@@ -87,6 +102,10 @@ def output_page() -> str:
         "\n".join([head, *output_rows(CATALOGUE)]),
         "## Machines and trains",
         "\n".join([head, *output_rows(machine.catalogue)]),
+        "## Codes of flags",
+        "The attribute `flag_meanings` of a variable holds its words. "
+        "[Labels](../numerics.md#labels) has the rules of `motion`.",
+        code_table(),
     ]
     return "\n\n".join(parts) + "\n"
 

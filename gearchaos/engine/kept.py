@@ -25,6 +25,16 @@ from gearchaos.records.difference import difference
 from gearchaos.records.dimension import kaplan_yorke
 from gearchaos.records.label import MOTION_MEANINGS, QUASI_PERIODIC, UNRESOLVED
 
+MEANINGS: dict[str, Sequence[str]] = {
+    "motion": MOTION_MEANINGS,
+    names.RECORD: RECORD_MEANINGS,
+    "contact_state_@": CONTACT_STATES,
+    "capture": CAPTURE_MEANINGS,
+    "motion_changed": error_check.CHANGE_MEANINGS,
+    names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+}
+"""Words for the codes 0, 1, ... of each flag, by the name of the output."""
+
 
 def variables_of(run: RunPlan) -> list[Variable]:
     """Return the variables of a sweep, in the order of the file."""
@@ -58,15 +68,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
         names.ORDER: np.array([float(order) for order in run.plan.orders]),
         names.STATE: np.arange(len(run.lanes.states)),
     }
-    meanings = {
-        "motion": MOTION_MEANINGS,
-        names.RECORD: RECORD_MEANINGS,
-        "contact_state_@": CONTACT_STATES,
-        "capture": CAPTURE_MEANINGS,
-        "motion_changed": error_check.CHANGE_MEANINGS,
-        names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
-        names.STATE: run.lanes.states,
-    }
+    meanings = MEANINGS | {names.STATE: run.lanes.states}
     wordings = {"period": excitation_periods if repeats > 1 else "mesh periods"}
     return model.catalogue.variables(run.lanes.axes, parts, Details(values, meanings, wordings))
 

@@ -157,6 +157,10 @@ def test_the_reference_of_the_site_has_all_that_the_program_has():
         assert f"`{output.name.replace('@', 'STATE')}`" in made["reference/outputs.md"] or (
             "@" in output.name
         )
+    codes = (
+        "| `motion` | 0 `periodic`, 1 `quasi_periodic`, 2 `chaotic`, 3 `unresolved`, 4 `diverged`"
+    )
+    assert codes in made["reference/outputs.md"]
     for name in {*gearchaos.__all__} - {"iso1328"}:
         assert f".{name}\n" in made["reference/python.md"]
 
