@@ -25,6 +25,7 @@ from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
 from gearchaos.models import swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
@@ -173,6 +174,7 @@ class BranchSearch:
         curve = self.over.curve(self.run.plan, motion.period, self._scale)
         waiting = [self._from_motion(curve, motion)]
         while waiting:
+            check()
             waiting = [
                 search
                 for branch in run(together(waiting), defects_of)
