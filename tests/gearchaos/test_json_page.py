@@ -13,7 +13,8 @@ from .commands import run_module, small_config
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 OPTIONAL = {"directions_apart", "boundaries", "zero_one"}
-"""Keys of options that the sweep below does not have."""
+OPTIONAL |= {"free_eigenfrequencies", "free_eigenfrequencies_Hz"}
+"""Keys of options and models that the sweep below does not have."""
 
 
 def listed(heading: str) -> set[str]:

@@ -27,6 +27,8 @@ class MachineModel(Model):
     units: Mapping[Quantity, str] = MappingProxyType({})
     angle = ""
     terms: Mapping[str, str] = TERMS
+    rate_words = "rad per unit of time"
+    free_words = "no element in contact"
 
     def __init__(self, config: MachineConfiguration) -> None:
         self._kinds = config.kinds_of_elements
