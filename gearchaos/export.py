@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".csv", ".parquet", ".mat")
 SEPARATORS = {".": ",", ",": ";"}
-"""What separates the columns of a CSV file, by its decimal separator."""
+"""Separators of the columns of a CSV file, by its decimal separator."""
 
 
 class ExportOptions(NamedTuple):

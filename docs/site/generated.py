@@ -178,10 +178,12 @@ PAGES = {
 def notebook_pages() -> Iterator[tuple[str, str | bytes]]:
     """Yield path and content of the page of every notebook, and of its pictures."""
     from nbconvert import MarkdownExporter
+    from nbconvert.preprocessors import CoalesceStreamsPreprocessor
 
+    exporter = MarkdownExporter(preprocessors=[CoalesceStreamsPreprocessor])
     for notebook in sorted((CLONE / "docs" / "tutorials").glob("*.ipynb")):
         unique = {"unique_key": notebook.stem}
-        page, resources = MarkdownExporter().from_filename(str(notebook), resources=unique)
+        page, resources = exporter.from_filename(str(notebook), resources=unique)
         yield f"tutorials/{notebook.stem}.md", page
         yield from ((f"tutorials/{name}", data) for name, data in resources["outputs"].items())
 

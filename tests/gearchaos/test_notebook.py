@@ -20,7 +20,8 @@ def printed(notebook):
     shown = []
     for cell in notebook.cells:
         outputs = cell.get("outputs", [])
-        text = "".join(output.get("text", "") for output in outputs)
+        # A terminal ends lines with a carriage return, too.
+        text = "".join(output.get("text", "").replace("\r", "") for output in outputs)
         kinds = [sorted(output["data"]) for output in outputs if "data" in output]
         shown.append((bool(text) if ANY_TEXT in cell.metadata.get("tags", ()) else text, kinds))
     return shown
