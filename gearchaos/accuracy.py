@@ -163,7 +163,7 @@ def recommendation(settings: "Sequence[Candidate]", error: float) -> str:
     if not enough:
         return f"For an error of {error:.0e}: none of these; give finer --steps."
     best = min(enough, key=lambda setting: setting.seconds)
-    return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per mesh period."
+    return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per period."
 
 
 main = Command("accuracy", __doc__, AccuracyOptions, _accuracy).start(__name__)

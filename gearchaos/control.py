@@ -14,11 +14,14 @@ The table goes to stdout, everything else to stderr. With --output, a figure is 
 
 import json
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
 from gearchaos.options import ConfigFile, Option, Overwrite, Place, Threads
+from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.controlling.controller import Controller
@@ -77,9 +80,18 @@ def _control(options: ControlOptions) -> None:
     choose_threads(options.threads)
     if options.output:
         check_figures([options.output], [options.config], options.overwrite)
+    began = perf_counter()
     with compiling():
-        controller = _controller(options)
-        trial = try_controller(controller, options.starts, options.periods)
+        try:
+            controller = _controller(options)
+            say(f"trying {options.starts} starts, {options.periods} mesh periods each")
+            check()
+            trial = try_controller(controller, options.starts, options.periods)
+            check()
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note("nothing is kept or written; fewer --starts take less time")
+            raise
+    say(f"{options.starts} starts, {perf_counter() - began:.1f} s")
     facts = facts_of(trial)
     if options.json:
         complex_names = ("multipliers", "closed_multipliers")

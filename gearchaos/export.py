@@ -10,7 +10,7 @@ in the attributes that pandas reads.
 The path of the file goes to stdout. Needs more packages: pip install "gearchaos[export]".
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from gearchaos.results.reading.result import Result
 
 ENDINGS = (".csv", ".parquet", ".mat")
+SEPARATORS = {".": ",", ",": ";"}
+"""Separators of the columns of a CSV file, by its decimal separator."""
 
 
 class ExportOptions(NamedTuple):
@@ -46,6 +48,10 @@ class ExportOptions(NamedTuple):
     spectrum: Annotated[
         bool, Option("of a response, write amplitudes over the frequency instead of the motion")
     ] = False
+    decimal: Annotated[
+        Literal[".", ","],
+        Option("decimal separator of a CSV file; with a comma, semicolons separate columns"),
+    ] = "."
     overwrite: Overwrite = False
     units: Units = None
 
@@ -61,6 +67,8 @@ def _export(options: ExportOptions) -> None:
     kind = options.output.lower().rpartition(".")[2]
     if not options.output.lower().endswith(ENDINGS):
         raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
+    if options.decimal != "." and kind != "csv":
+        raise ConfigurationError(f"--decimal {options.decimal}: is for .csv only; leave it out")
     result = open_result(options.result)
     over_time = is_response(result)
     if options.spectrum and not (over_time and kind != "mat"):
@@ -75,7 +83,9 @@ def _export(options: ExportOptions) -> None:
             frame = _table(result, options, over_time)
             if kind == "csv":
                 headings = _headings(result, frame)
-                frame.rename(columns=headings).rename_axis(index=headings).to_csv(partial)
+                separators = {"decimal": options.decimal, "sep": SEPARATORS[options.decimal]}
+                named = frame.rename(columns=headings).rename_axis(index=headings)
+                named.to_csv(partial, **separators)
             else:
                 needed("pyarrow")
                 frame.to_parquet(partial, engine="pyarrow")

@@ -97,7 +97,7 @@ def _respond(options: ResponseOptions) -> int:
     fast = " or too fast" if METHODS[run.plan.method].shares_maps else ""
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
-        f"{periods} mesh periods of {run.plan.steps_per_period} steps, "
+        f"{periods} periods of {run.plan.steps_per_period} steps, "
         f"{diverged} diverged{fast}"
     )
     return ending(run, output, diverged, text)

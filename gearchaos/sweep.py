@@ -126,14 +126,14 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
     """Compute the sweep, or one shard of it, and return the exit code."""
     from gearchaos.engine.kept import variables_of
     from gearchaos.engine.running import metadata, prepare
-    from gearchaos.engine.store_filling import fill, open_store
+    from gearchaos.engine.store_filling import fill, open_store, shared_blocks
     from gearchaos.results.files.atomic_file import check_output
 
     check_output(output, options.overwrite)
     began = time.monotonic()
     with open_store(run, output, resume=options.resume, shard=shard) as store:
         # Workers compile for themselves: they may run on another kind of machine.
-        run = prepare(run, compile_now=options.dask is None)
+        run = prepare(run, compile_now=options.dask is None and store.own_lanes > 0)
         try:
             tally, performed_by = fill(run, store, options.dask)
             seconds = time.monotonic() - began
@@ -153,6 +153,13 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
     else:
         print(store.folder, flush=True)
     join = _command("merge", output)
+    if not store.own_lanes:
+        used = len(shared_blocks(len(run.lanes), shard.of))
+        said = [
+            f"shard {options.shard} has no lanes: the {len(run.lanes)} lanes of the sweep are "
+            f"{used} block{'s' if used > 1 else ''}, one for each of the first {used} shards; "
+            "fewer shards are enough"
+        ]
     say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")
     return OK
 

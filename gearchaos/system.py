@@ -318,7 +318,7 @@ class System:
         )
         if not found.converged[0]:
             raise ConfigurationError(
-                f"{self.config.source}: no orbit of {period * self.repeats_after} mesh periods "
+                f"{self.config.source}: no orbit of period {period} "
                 "next to the guess; give "
                 "another period or guess, or a longer integration.transient_periods"
             )
@@ -622,7 +622,7 @@ class System:
         if outcome.status[0] != Status.OK:
             raise ConfigurationError(
                 f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
-                f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
+                f"period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
                 "check the load and the start state"
             )
 

@@ -1,8 +1,8 @@
-"""Pages of the manual that are made from the program when the site is built, and the links out.
+"""Pages of the manual that are made when the site is built, and the links out.
 
-A hook of MkDocs. The pages are those of the commands, the keys, the outputs, the public names and
-the changes. A link from a page to a file of the clone that is no page is shown as its path, and
-equations become MathML.
+A hook of MkDocs. The pages of the commands, the keys, the outputs, the public names and the changes
+are made from the program, those of the tutorials from notebooks. A link from a page to a file of
+the clone that is no page is shown as its path, and equations become MathML.
 """
 
 import importlib
@@ -62,11 +62,26 @@ def output_rows(catalogue) -> Iterator[str]:
             name = output.name.replace("@", subject.replace("/COORDINATE_acceleration", ""))
             wording = catalogue.long_names.get(output.name, output.long_name)
             wording = wording.replace("@", subject.partition("/")[0] or "mesh periods")
+            wording = catalogue.worded(wording)
             fill = "" if output.fill_value is None else f"`{output.fill_value}`"
             dims = ", ".join(output.dims)
             values = ", ".join(f"{number} {word}" for number, word in enumerate(output.meanings))
             meaning = f"{wording} ({values})" if values else wording
             yield f"| `{name}` | ({dims}) | {output.dtype} | {fill} | {meaning} | {part.when} |"
+
+
+def code_table() -> str:
+    """Return the table of the codes of all flags and their words."""
+    from gearchaos.engine.kept import MEANINGS
+    from gearchaos.outputs.catalogue import CONTACTS, NO_CONTACT
+
+    rows = MEANINGS | {"contact_@": CONTACTS}
+    lines = ["| variable | codes |", "|---|---|"]
+    for name, words in rows.items():
+        codes = [f"{code} `{'_'.join(word.split())}`" for code, word in enumerate(words)]
+        codes += [f"{NO_CONTACT} no value"] if words is CONTACTS else []
+        lines.append(f"| `{name.replace('@', 'ELEMENT')}` | {', '.join(codes)} |")
+    return "\n".join(lines)
 
 
 def output_page() -> str:
@@ -87,6 +102,10 @@ def output_page() -> str:
         "\n".join([head, *output_rows(CATALOGUE)]),
         "## Machines and trains",
         "\n".join([head, *output_rows(machine.catalogue)]),
+        "## Codes of flags",
+        "The attribute `flag_meanings` of a variable holds its words. "
+        "[Labels](../numerics.md#labels) has the rules of `motion`.",
+        code_table(),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -156,17 +175,32 @@ PAGES = {
 }
 
 
+def notebook_pages() -> Iterator[tuple[str, str | bytes]]:
+    """Yield path and content of the page of every notebook, and of its pictures."""
+    from nbconvert import MarkdownExporter
+    from nbconvert.preprocessors import CoalesceStreamsPreprocessor
+
+    exporter = MarkdownExporter(preprocessors=[CoalesceStreamsPreprocessor])
+    for notebook in sorted((CLONE / "docs" / "tutorials").glob("*.ipynb")):
+        unique = {"unique_key": notebook.stem}
+        page, resources = exporter.from_filename(str(notebook), resources=unique)
+        yield f"tutorials/{notebook.stem}.md", page
+        yield from ((f"tutorials/{name}", data) for name, data in resources["outputs"].items())
+
+
 def on_files(files, config):
-    """Add the pages that are made from the program."""
+    """Add the pages that are made from the program and from notebooks."""
     from mkdocs.structure.files import File
 
-    for path, made in PAGES.items():
-        files.append(File.generated(config, path, content=made()))
+    made = ((path, page()) for path, page in PAGES.items())
+    for path, content in (*made, *notebook_pages()):
+        files.append(File.generated(config, path, content=content))
     return files
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Show links to files of the clone that are no pages as their paths."""
+    """Link to the pages of notebooks; show links to files that are no pages as their paths."""
+    markdown = re.sub(r"(\]\((?!\w+:)[^)\s#]+)\.ipynb\b", r"\1.md", markdown)
     folder = (Path(config.docs_dir) / page.file.src_uri).parent
 
     def shown(link):

@@ -29,7 +29,7 @@ from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
-from gearchaos.progress import say
+from gearchaos.progress import progress, say
 from gearchaos.records.boundary import BOUNDARY_KINDS, RESONANCES, Boundary, BoundaryPoint
 from gearchaos.records.branch import BRANCH_POINT, GRAZING, NEIMARK_SACKER
 from gearchaos.records.period import coordinate_scale
@@ -91,11 +91,23 @@ def find_boundaries(
         )
     over = _Ranges.of(config)
     search = _BoundarySearch(over, plan_run(_small(config, PARAMETERS)), longest, result)
-    with one_thread():
-        for number in search.axes_of_lines():
-            for share in (np.arange(lines) + 0.5) / lines:
+    places = [
+        (number, float(share))
+        for number in search.axes_of_lines()
+        for share in (np.arange(lines) + 0.5) / lines
+    ]
+    with one_thread(), progress(len(places), unit="lines") as bar:
+        try:
+            for number, share in places:
                 check()
-                search.along_line(result, number, float(share))
+                search.along_line(result, number, share)
+                bar.update()
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(
+                f"{bar.n} of {len(places)} lines were searched; nothing is written, and the "
+                f"{len(search.found)} curves found so far are not kept; take fewer --lines"
+            )
+            raise
         return search.described(result)
 
 
@@ -273,6 +285,7 @@ class _BoundarySearch:
         parameters = tuple(named[known.axis_name(one)] for one in self.over.parameters)
         facts = {
             "title": run.config.title,
+            "model": run.config.kind,
             "effects": " ".join(run.config.scene.effects),
             "method": run.config.integration.method,
             "steps_per_period": run.plan.steps_per_period,

@@ -25,6 +25,7 @@ from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
 from gearchaos.models import swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
@@ -173,6 +174,7 @@ class BranchSearch:
         curve = self.over.curve(self.run.plan, motion.period, self._scale)
         waiting = [self._from_motion(curve, motion)]
         while waiting:
+            check()
             waiting = [
                 search
                 for branch in run(together(waiting), defects_of)
@@ -253,6 +255,7 @@ def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
     quantities = tuple(one for one in variables_of(run) if one.name in of_orbits)
     facts = {
         "title": run.config.title,
+        "model": run.config.kind,
         "effects": " ".join(run.config.scene.effects),
         "method": run.config.integration.method,
         "steps_per_period": run.plan.steps_per_period,
@@ -299,7 +302,8 @@ def flank_name(run: RunPlan, number: int) -> str:
     if number < 0:
         return ""
     element, back = divmod(number, 2)
-    return f"{run.elements[element]}, {'back' if back else 'driving'} flank"
+    flank = f"{'back' if back else 'driving'} flank"
+    return f"{run.elements[element]}, {run.lanes.model.catalogue.worded(flank)}"
 
 
 def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[str, Floats]:

@@ -23,7 +23,17 @@ from gearchaos.records.contact import CONTACT_STATES, contact_summary
 from gearchaos.records.control import CAPTURE_MEANINGS
 from gearchaos.records.difference import difference
 from gearchaos.records.dimension import kaplan_yorke
-from gearchaos.records.label import MOTION_MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS, QUASI_PERIODIC, UNRESOLVED
+
+MEANINGS: dict[str, Sequence[str]] = {
+    "motion": MOTION_MEANINGS,
+    names.RECORD: RECORD_MEANINGS,
+    "contact_state_@": CONTACT_STATES,
+    "capture": CAPTURE_MEANINGS,
+    "motion_changed": error_check.CHANGE_MEANINGS,
+    names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+}
+"""Words for the codes 0, 1, ... of each flag, by the name of the output."""
 
 
 def variables_of(run: RunPlan) -> list[Variable]:
@@ -58,15 +68,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
         names.ORDER: np.array([float(order) for order in run.plan.orders]),
         names.STATE: np.arange(len(run.lanes.states)),
     }
-    meanings = {
-        "motion": MOTION_MEANINGS,
-        names.RECORD: RECORD_MEANINGS,
-        "contact_state_@": CONTACT_STATES,
-        "capture": CAPTURE_MEANINGS,
-        "motion_changed": error_check.CHANGE_MEANINGS,
-        names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
-        names.STATE: run.lanes.states,
-    }
+    meanings = MEANINGS | {names.STATE: run.lanes.states}
     wordings = {"period": excitation_periods if repeats > 1 else "mesh periods"}
     return model.catalogue.variables(run.lanes.axes, parts, Details(values, meanings, wordings))
 
@@ -113,15 +115,30 @@ def arrays_of(
             spectrum = spectrum.given(largest.of_orbit)
         arrays["lyapunov_exponents"] = spectrum.values
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
-        dimension, error = kaplan_yorke(spectrum.values, spectrum.standard_errors)
-        arrays["kaplan_yorke_dimension"] = dimension
-        arrays["kaplan_yorke_dimension_standard_error"] = error
+        motion = labelled.labels.motion if labelled else outcome.status * 0
+        arrays |= dimensions(spectrum.values, spectrum.standard_errors, motion)
         total = sum_of_exponents(system, contact_shares(outcome, plan))
         # The damping alone does not determine the sum of a closed loop.
         arrays["lyapunov_sum"] = total if system.control is None else np.full_like(total, np.nan)
     if run.config.integration.error_check > 0.0:
         arrays |= _check(run, lanes, start, outcome, labelled)
     return arrays
+
+
+def dimensions(values: Floats, errors: Floats, motion: Array) -> dict[str, Array]:
+    """Return the dimension of each lane and its error by variable.
+
+    ``values``, ``errors`` (lanes, states): all exponents; ``motion`` (lanes,): label of each lane.
+    """
+    errors = errors.copy()
+    torus = motion == QUASI_PERIODIC
+    # The largest exponent of a torus is 0; its estimate tends to 0 with the length of the record.
+    errors[torus, 0] = np.maximum(errors[torus, 0], np.abs(values[torus, 0]))
+    found = np.array(kaplan_yorke(values, errors))
+    # A record that is too short for a label is too short for errors of its exponents.
+    dimension, error = np.where(motion == UNRESOLVED, np.nan, found)
+    name = "kaplan_yorke_dimension"
+    return {name: dimension, f"{name}{names.STANDARD_ERROR}": error}
 
 
 def recorded_quantities(

@@ -15,8 +15,6 @@ ORDERS = (1, 2, 3)
 EXAMINED_LANES = 256
 """Largest number of lanes that are examined, spread evenly over the sweep."""
 
-UNIT = "per unit of tau"
-
 
 class Resonances(NamedTuple):
     """Properties of a sweep that are known before it runs, each as minimum and maximum.
@@ -31,7 +29,9 @@ class Resonances(NamedTuple):
         Static deflection in units of b'; NaN where the model has none.
     micrometres : array, shape (2,), or None
         The same in micrometres.
-    contact_words, deflection_words, exciter : str
+    free : array, shape (modes, 2)
+        Angular eigenfrequencies without contact, in Hz with scales; empty where they are left out.
+    rate_words, free_words, contact_words, deflection_words, exciter : str
         Descriptions of contact, of the deflection and of what excites, see `Model`.
     """
 
@@ -40,6 +40,9 @@ class Resonances(NamedTuple):
     rpm: Floats | None
     deflection: Floats
     micrometres: Floats | None
+    free: Floats
+    rate_words: str
+    free_words: str
     contact_words: str
     deflection_words: str
     exciter: str
@@ -50,7 +53,7 @@ class Resonances(NamedTuple):
         where = f"({self.contact_words})"
         texts = {"modes": f"none that oscillates {where}"}
         if len(self.frequencies):
-            values, unit, met = self.frequencies, UNIT, self.frequencies
+            values, unit, met = self.frequencies, self.rate_words, self.frequencies
             speed = f"({self.exciter} frequency)"
             if self.hertz is not None:
                 values, unit = self.hertz, "Hz"
@@ -59,6 +62,9 @@ class Resonances(NamedTuple):
             texts["modes"] = f"eigenfrequencies {_listed(values)} {unit} {where}"
             orders = (f"order {order} at {_listed(met / order)} {speed}" for order in ORDERS)
             texts["orders"] = f"the {self.exciter} meets them with {'; '.join(orders)}"
+        if len(self.free):
+            unit = self.rate_words if self.hertz is None else "Hz"
+            texts["free"] = f"eigenfrequencies {_listed(self.free)} {unit} ({self.free_words})"
         bent, unit = self.deflection, "b'"
         if self.micrometres is not None:
             bent, unit = self.micrometres, "um"
@@ -73,6 +79,9 @@ class Resonances(NamedTuple):
         facts["resonant_mesh_frequencies"] = _by_order(self.frequencies)
         if self.hertz is not None:
             facts["eigenfrequencies_Hz"] = self.hertz.tolist()
+        if len(self.free):
+            unit = "" if self.hertz is None else "_Hz"
+            facts[f"free_eigenfrequencies{unit}"] = self.free.tolist()
         if self.rpm is not None:
             facts["resonant_speeds_rpm"] = _by_order(self.rpm)
         # JSON has no NaN.
@@ -89,7 +98,10 @@ def resonances(lanes: Lanes) -> Resonances:
     system, scales = system_of(config, values), lanes.model.scales(config, values)
     found, bent = eigenfrequencies(system), system.static_force()
     modes, hertz, rpm = np.isfinite(found).any(axis=0), None, None
+    free = eigenfrequencies(system, free=True) if lanes.model.free_words else found[:, :0]
+    free = free[:, np.isfinite(free).any(axis=0)]
     if scales.frequency is not None:
+        free = free * scales.frequency[:, np.newaxis] / (2.0 * np.pi)
         hertz = _ends((found * scales.frequency[:, np.newaxis] / (2.0 * np.pi))[:, modes])
         rpm = None if scales.speed is None else scales.speed * hertz
     return Resonances(
@@ -98,6 +110,9 @@ def resonances(lanes: Lanes) -> Resonances:
         rpm,
         _ends(bent),
         None if scales.length is None else _ends(bent * scales.length),
+        _ends(free),
+        lanes.model.rate_words,
+        lanes.model.free_words,
         lanes.model.contact_words,
         lanes.model.deflection_words,
         lanes.model.exciter,

@@ -169,6 +169,7 @@ def metadata(run: RunPlan, seconds: float) -> Mapping[str, Any]:
     config, repeats = run.config, run.lanes.repeats_after
     return {
         "title": config.title,
+        "model": config.kind,
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,

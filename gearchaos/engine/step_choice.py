@@ -173,7 +173,7 @@ def choice_note(verdict: Verdict, limit: int) -> str:
         chosen = f'the most that are chosen; integration.method = "{EXACT.name}" is more exact'
     return (
         f"integration.steps_per_period = {verdict.steps}, {chosen}: {DEFAULT.title} is stable "
-        f"from {limit} on, and after {PERIODS} mesh periods {_off(verdict)} in {_tried(lanes)}"
+        f"from {limit} on, and after {PERIODS} periods {_off(verdict)} in {_tried(lanes)}"
         f"{_sensitive_ones(verdict)}"
     )
 
@@ -187,7 +187,7 @@ def coarse_note(verdict: Verdict, better: Verdict) -> str:
     if not wrong.any():
         return ""
     where = f"in {np.count_nonzero(wrong)} of {_tried(verdict.error.size)}"
-    text = f"after {PERIODS} mesh periods {_off(verdict)} {where}"
+    text = f"after {PERIODS} periods {_off(verdict)} {where}"
     if not verdict.within(WRONG):
         remedy = f"leave it out, or set it to {better.steps}"
         if not better.within(WANTED):

@@ -40,6 +40,7 @@ from gearchaos.outputs.names import (
 from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
+TWO_ERRORS = "\N{PLUS-MINUS SIGN}2 standard errors"
 LINE_PT = 0.6  # Width of lines.
 DECADES = 5  # Decades of the colour scale, down from the largest amplitude.
 
@@ -101,7 +102,7 @@ def bifurcation(
     rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
     alpha = _opacity(lanes.numbers.size, max(1, rows.shape[1]))
     look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
-    dotted, parts = lanes, {}
+    dotted, parts = lanes, dict[str, Any]()
     if lines and rows.shape[1] == 1:
         values = rows[lanes.numbers, 0]
         join, dash = joined(result, lanes, values), DASHES.get(marker, "-")
@@ -110,8 +111,34 @@ def bifurcation(
         dotted = lanes._replace(diverged=lanes.diverged | beside[1:] | beside[:-1])
     points = dots(axes, dotted, rows, rasterized=True, alpha=alpha, **look)
     axes.set_ylabel(axis_label(result, variable, line_length=34))
-    own = Diagram(points, lanes, *_extremes(lanes, rows), parts=parts)
+    low, high = _extremes(lanes, rows)
+    reach = _reach_of(result, variable, lanes)
+    named: list[Artist] = []
+    if (reach > 0.0).any():
+        parts["bars"] = _bars(axes, lanes.parameter, low, reach, color)
+        named.append(parts["bars"])
+    own = Diagram(points, lanes, low, high, reach, named, parts=parts)
     return close_panel(axes, result, own)
+
+
+def _reach_of(result: Result, variable: str, lanes: ShownLanes) -> Floats:
+    """Return two standard errors of a variable of each lane, (lanes,), 0 where it has none."""
+    error = variable + STANDARD_ERROR
+    if variable == LARGEST_EXPONENT or error not in result.variables[variable].errors:
+        return np.zeros(lanes.numbers.size)
+    spread: Floats = np.nan_to_num(BAND_STANDARD_ERRORS * result.lanes(error)[lanes.numbers])
+    return spread
+
+
+def _bars(axes: Axes, x: Floats, values: Floats, reach: Floats, color: str) -> Artist:
+    """Draw bars of two standard errors behind the dots of a variable."""
+    look: dict[str, Any] = {"colors": _pale(color), "lw": 0.6, "zorder": 1.0}
+    return axes.vlines(x, values - reach, values + reach, label=TWO_ERRORS, **look)
+
+
+def _pale(color: str) -> Any:
+    """Return the colour of uncertainty around what has a colour."""
+    return 0.6 + 0.4 * np.array(to_rgb(color))
 
 
 def _opacity(lanes: int, points: int) -> float:
@@ -255,8 +282,8 @@ def _draw_exponents(
     # Colours are left to the stages behind: hatching and uncertainty are grey.
     fill: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
     positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **fill)
-    pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
-    fill = {"color": pale, "lw": 0.0, "label": "\N{PLUS-MINUS SIGN}2 standard errors"}
+    pale = _pale(color)
+    fill = {"color": pale, "lw": 0.0, "label": TWO_ERRORS}
     band = axes.fill_between(x, joined - reach, joined + reach, **fill)
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
     bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)

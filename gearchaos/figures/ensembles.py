@@ -327,7 +327,7 @@ def _look(one: Basin) -> dict[str, Any]:
 
 def _label(found: Basins, state: str) -> str:
     """Return the label of a state, in the units of the basins."""
-    subject, scale = subject_of(state), scale_of(state)
+    subject, scale = subject_of(state), scale_of(state, found.result.metadata)
     words = subject.long_name, subject.symbol
     units = found.units.get(state, "1")
     return label_of(Variable(state, (), "float64", units, *words, scale=scale))

@@ -106,6 +106,11 @@ def mesh_periods(result: Result) -> Floats:
     return time if result.variables[TIME].units != "s" else time / seconds_per_period(result)
 
 
+def period_name(result: Result) -> str:
+    """Return how the model of a response calls a period: mesh period, or excitation period."""
+    return result.variables[MESH_PERIOD].long_name if MESH_PERIOD in result else "mesh period"
+
+
 def seconds_per_period(result: Result) -> float:
     """Return the mesh period in seconds; NaN where the time of a response is in mesh periods."""
     if TIME not in result or result.variables[TIME].units != "s":
@@ -122,7 +127,7 @@ def time_axis(result: Result, in_periods: bool = False) -> tuple[float, str]:
         power, prefix = prefix_of(float(result[TIME][-1]))
         return seconds / power, f"Time, $t$ ({prefix}s)"
     if seconds > 0.0:
-        return 1.0, "Time in mesh periods"
+        return 1.0, f"Time in {period_name(result)}s"
     return 1.0, axis_label(result, TIME)
 
 
@@ -328,7 +333,7 @@ def frequency_axis(result: Result, highest: float, in_orders: bool) -> tuple[flo
     """Return the mesh frequency on the axis of a spectrum up to an order, and its label."""
     seconds = seconds_per_period(result)
     if in_orders or not seconds > 0.0:
-        return 1.0, "Frequency over mesh frequency"
+        return 1.0, f"Frequency over {period_name(result).replace('period', 'frequency')}"
     power, prefix = prefix_of(highest / seconds)
     return 1.0 / (seconds * power), f"Frequency, $f$ ({prefix}Hz)"
 
@@ -344,7 +349,7 @@ def spectrum_of(result: Result, lane: int, variable: str) -> tuple[Floats, Float
     record = values[-1 - periods * steps : -1]
     order, amplitude = spectral_lines(record, steps, hann=window == "Hann")
     plural = "s" if periods > 1 else ""
-    return order, amplitude, f"{window} window, {periods} mesh period{plural}"
+    return order, amplitude, f"{window} window, {periods} {period_name(result)}{plural}"
 
 
 def _draw_spectrum(axes: Axes, order: Floats, amplitude: Floats) -> LineCollection:

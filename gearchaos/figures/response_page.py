@@ -172,7 +172,7 @@ def _draw_phase_plane(portrait: Axes, section: Axes, motion: _Motion) -> None:
     points = response.poincare_section(section, result, lane, motion.variable)
     first, last = motion.shown
     late = f", black: last {SHOWN_REVOLUTIONS} revolutions" if motion.teeth and first else ""
-    remark(portrait, f"last {round(last)} mesh periods{late}")
+    remark(portrait, f"last {round(last)} {response.period_name(result)}s{late}")
     if motion.teeth:
         repeats = response.repeats_after(result, lane)
         number = repeats // motion.excitation.excitation_period
@@ -183,7 +183,8 @@ def _draw_phase_plane(portrait: Axes, section: Axes, motion: _Motion) -> None:
         curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
     else:
         # The section may be longer than the history: the lane may converge in between.
-        remark(section, f"last {np.size(points.get_xdata())} mesh periods")
+        kept = np.size(points.get_xdata())
+        remark(section, f"last {kept} {response.period_name(result)}s")
     for axes in (portrait, section):
         few_ticks(axes, 6, 6)
 

@@ -28,7 +28,7 @@ def work_precision_page(modes: Mapping[str, Sequence[tuple[int, float, float]]])
     """
     with column(HEIGHT_MM) as figure:
         panels = figure.subplots(1, 2, sharey=True)
-        for cost, label in enumerate(("Steps per mesh period", "Time (s)")):
+        for cost, label in enumerate(("Steps per period", "Time (s)")):
             axes, lines = panels[cost], []
             for (mode, points), look in zip(modes.items(), LOOKS, strict=False):
                 known = [(one[cost], one[2]) for one in points if 0.0 < one[2] < np.inf]

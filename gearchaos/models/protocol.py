@@ -69,6 +69,10 @@ class Model(ABC):
         Parts of the catalogue that `loads` computes.
     signals : tuple of str
         Names of the signals that the compiled formulas observe.
+    rate_words : str
+        Unit of angular frequencies where no physical one is known.
+    free_words : str
+        When no element is in contact, for the eigenfrequencies then; empty to leave them out.
     contact_words, deflection_words : str
         What the eigenfrequencies and the static deflection are those of, in a sentence.
     exciter : str
@@ -82,6 +86,8 @@ class Model(ABC):
     catalogue: Catalogue
     load_parts: tuple[Part, ...] = ()
     signals: tuple[str, ...] = ()
+    rate_words: str = "per unit of tau"
+    free_words: str = ""
     contact_words: str = "mean stiffness, all elements in contact"
     deflection_words: str = "under the static load"
     exciter: str = "excitation"

@@ -8,7 +8,7 @@ from gearchaos.outputs import names
 from gearchaos.outputs.entries import LANE_AXES, Kind, Output, Part, numbers
 from gearchaos.outputs.scales import Quantity
 
-CONTACTS = ("apart", "driving_flank", "back_flank")
+CONTACTS = ("apart", "driving flank", "back flank")
 """Meanings of the contacts 0, 1 and 2 of an element at one instant."""
 NO_CONTACT = 255
 """Contact of a lane that diverged."""

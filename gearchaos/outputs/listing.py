@@ -53,6 +53,8 @@ class Catalogue:
         Units of quantities that the model computes in physical units; all others are pure numbers.
     long_names : mapping of str to str
         Wordings in place of generic ones, by the name of the output.
+    terms : mapping of str to str
+        Terms of the model in place of those of gears, which generic wordings use.
 
     Raises
     ------
@@ -81,6 +83,7 @@ class Catalogue:
     parameters: Mapping[str, Quantity] = field(default_factory=dict)
     units: Mapping[Quantity, str] = field(default_factory=dict)
     long_names: Mapping[str, str] = field(default_factory=dict)
+    terms: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [output.name_for(one) for _, output, one in self._all()]
@@ -184,6 +187,12 @@ class Catalogue:
         every = (subject for subjects in self.subjects.values() for subject in subjects)
         return next((subject for subject in every if subject.name == name), None)
 
+    def worded(self, text: str) -> str:
+        """Return a text with the terms of the model in place of those of gears."""
+        for term, other in self.terms.items():
+            text = text.replace(term, other)
+        return text
+
     @cached_property
     def _outputs(self) -> dict[str, Output]:
         return {output.name: output for part in self.parts for output in part.outputs}
@@ -248,10 +257,10 @@ class Catalogue:
             dims=output.dims_over(axes),
             dtype=output.dtype,
             units=self.units.get(_quantity(output, subject), "1"),
-            long_name=long_name.replace(SUBJECT, wording),
+            long_name=self.worded(long_name).replace(SUBJECT, self.worded(wording)),
             symbol=output.symbol.replace(SUBJECT, subject.symbol),
             fill_value=None if output.fill_value is None else number(output.fill_value),
-            flags=tuple("_".join(one.split()) for one in meanings),
+            flags=tuple("_".join(self.worded(one).split()) for one in meanings),
             errors=output.errors,
             values=None if values is None else np.asarray(values, dtype=output.dtype),
             scale=self.scales.get(_quantity(output, subject), PURE),

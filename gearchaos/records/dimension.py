@@ -35,8 +35,24 @@ def kaplan_yorke(exponents: Floats, errors: Floats) -> tuple[Floats, Floats]:
     exponents of one record depend on each other. Their errors are added, which is an upper bound::
 
         s_D = (s_1 + ... + s_k) / |lambda_(k+1)| + |S_k| s_(k+1) / lambda_(k+1)^2
+
+    Where the decision on k changes if all exponents move by one standard error, s_D is at least the
+    change of D.
+    """
+    dimension, error = _dimension(exponents, errors, 0.0)
+    for moved in (-1.0, 1.0):
+        there, _ = _dimension(exponents, errors, moved)
+        error = np.maximum(error, np.nan_to_num(np.abs(there - dimension)))
+    return dimension, error
+
+
+def _dimension(exponents: Floats, errors: Floats, moved: float) -> tuple[Floats, Floats]:
+    """Return the dimension with exponents that move by standard errors, and its first-order error.
+
+    What counts as zero stays within the same distance of zero.
     """
     lanes, states = exponents.shape
+    exponents = exponents + moved * errors
     sums = np.pad(np.cumsum(exponents, axis=1), ((0, 0), (1, 0)))
     reach = np.pad(np.cumsum(errors, axis=1), ((0, 0), (1, 0)))
     # The first sum that is negative or unknown ends the attractor.

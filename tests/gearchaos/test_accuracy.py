@@ -35,7 +35,7 @@ def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended)
     assert [int(line.split()[0]) for line in lines[1:-3]] == [50, 100, 200] * 2 + [*FLOW_MAP_STEPS]
     for line, error in zip(lines[-3:], ("1e-04", "1e-06", "1e-08"), strict=True):
         assert re.fullmatch(
-            rf"For an error of {error}: (\d+ (plain|resolved|flow map) steps per mesh period\."
+            rf"For an error of {error}: (\d+ (plain|resolved|flow map) steps per period\."
             r"|none of these; give finer --steps\.)",
             line,
         )

@@ -1,6 +1,10 @@
 """Curves over two parameters, against exact values, one-parameter branches and closed forms."""
 
 import json
+import os
+import re
+import signal
+import time
 from functools import cache
 from pathlib import Path
 
@@ -19,7 +23,7 @@ from gearchaos.records.branch import FOLD, GRAZING, PERIOD_DOUBLING
 from gearchaos.results.files.boundary_file import write_boundaries
 from gearchaos.results.files.boundary_reader import read_boundaries
 
-from .commands import run_module
+from .commands import begin, is_running, run_module
 
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
 
@@ -190,7 +194,7 @@ def test_the_motion_that_never_separates_grazes_where_the_linear_response_reache
     frequency, amplitude = grazing.values.T
     square = frequency**2
     response = amplitude * square / np.hypot(1.0 - square, 2.0 * zeta * frequency)
-    assert grazing.flank == "mesh, driving flank"
+    assert grazing.flank == "mesh, upper side"
     assert frequency.size > 20
     assert response == pytest.approx(load, abs=1e-10)
 
@@ -320,6 +324,22 @@ def test_faults_are_one_sentence(files, arguments, words):
     assert "Traceback" not in done.err
     for word in words:
         assert word in done.err
+
+
+def test_an_interrupt_says_what_is_lost_and_leaves_an_earlier_file(files, tmp_path):
+    earlier = tmp_path / "earlier.h5"
+    earlier.write_bytes(b"earlier")
+    words = ("map.h5", "--lines", "40", "-o", str(earlier), "--overwrite")
+    log = tmp_path / "log"
+    process, ended = begin("gearchaos.boundaries", (*words, "--log", str(log)), files[0])
+    while is_running(process) and not (log.exists() and "branches; " in log.read_text()):
+        time.sleep(0.005)
+    os.kill(process, signal.SIGINT)
+    code, out, err = ended()
+    assert (code, out) == (130, "")
+    assert "gearchaos boundaries: interrupted\n" in err
+    assert re.search(r"[1-9]\d* of 80 lines were searched; nothing is written, and the \d+", err)
+    assert earlier.read_bytes() == b"earlier"
 
 
 def test_a_configuration_without_a_second_sweep_is_refused(files):

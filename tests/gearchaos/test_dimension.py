@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from gearchaos.engine.computing import compute_block
+from gearchaos.engine.kept import dimensions
 from gearchaos.records.dimension import kaplan_yorke
+from gearchaos.records.label import PERIODIC, QUASI_PERIODIC, UNRESOLVED
 
 from .short_sweeps import unlabelled
 
@@ -39,6 +41,16 @@ def test_the_error_bounds_the_spread_of_exponents_that_vary_together():
         assert 0.2 * error < found.std() < 1.02 * error
 
 
+@pytest.mark.parametrize(
+    ("largest", "least"),
+    # In standard errors: certain orbit, nearly a torus, torus, torus that may be an orbit.
+    [(-9.0, 0.0), (-2.5, 0.9), (-0.5, 0.0), (-1.5, 0.9)],
+)
+def test_the_error_has_the_step_of_a_decision_that_an_error_can_change(largest, least):
+    _, error = dimension([largest * 1e-4, -0.1], [1e-4, 1e-4])
+    assert least <= error < least + 0.11
+
+
 @pytest.mark.parametrize("exponents", [[0.1, 0.1], [np.nan, np.nan], [0.1, np.nan], [0.0, 0.0]])
 def test_what_the_exponents_do_not_decide_is_unknown(exponents):
     found, error = dimension(exponents)
@@ -51,3 +63,12 @@ def test_a_sweep_with_all_exponents_has_the_dimension_of_each_lane():
     found = kaplan_yorke(arrays["lyapunov_exponents"], arrays["lyapunov_exponents_standard_error"])
     np.testing.assert_array_equal(arrays["kaplan_yorke_dimension"], found[0])
     np.testing.assert_array_equal(arrays["kaplan_yorke_dimension_standard_error"], found[1])
+
+
+def test_labels_decide_on_tori_and_on_what_is_unresolved():
+    values = np.array([[-0.001, -0.1]] * 3)
+    labels = np.array([PERIODIC, QUASI_PERIODIC, UNRESOLVED])
+    found = dimensions(values, np.full((3, 2), 1e-5), labels)
+    own, error = found.values()
+    np.testing.assert_allclose(own, [0.0, 0.99, np.nan])
+    assert error[0] == 0.0 and error[1] > 0.01 and np.isnan(error[2])

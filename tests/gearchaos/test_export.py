@@ -95,6 +95,18 @@ def test_tables_as_files_come_back_as_they_were(path, ending, along, capsys):
         np.testing.assert_array_equal(column, wanted[name].to_numpy())
 
 
+def test_decimal_commas_come_with_semicolons_and_in_csv_only(path, capsys):
+    pandas = pytest.importorskip("pandas")
+    target = path.with_suffix(".csv")
+    assert main([str(path), str(target), "--decimal", ","]) == 0
+    read = pandas.read_csv(target, sep=";", decimal=",")
+    wanted = RESULT.to_dataframe().reset_index()
+    np.testing.assert_allclose(read.iloc[:, 0], wanted["load"], rtol=1e-15)
+    assert "," in target.read_text().splitlines()[1] and len(read.columns) == len(wanted.columns)
+    assert main([str(path), str(path.with_suffix(".mat")), "--decimal", ","]) == 2
+    assert "--decimal ,: is for .csv only" in capsys.readouterr().err
+
+
 def test_matlab_gets_every_array_by_its_name(path):
     io = pytest.importorskip("scipy.io")
     assert main([str(path), str(path.with_suffix(".mat"))]) == 0

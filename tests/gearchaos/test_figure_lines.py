@@ -8,6 +8,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from gearchaos.figures import bifurcation, bifurcation_page
+from gearchaos.outputs.catalogue import DIMENSION_PART
+from gearchaos.outputs.listing import GENERIC
 from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main
 from gearchaos.records.label import MOTION_MEANINGS
@@ -126,3 +128,16 @@ def test_a_matplotlibrc_file_changes_the_style(path, tmp_path):
     assert done.returncode == 0, done.stderr
     drawn = path.with_suffix(".svg").read_text()
     assert "DejaVu Sans" in drawn and "stroke-width: 3.5" in drawn
+
+
+def test_a_variable_with_standard_errors_has_bars_of_two():
+    result, name = steps(), "kaplan_yorke_dimension"
+    more = GENERIC.variables([result.variables["load"]], {DIMENSION_PART: True})[1:]
+    data = {one: result[one] for one in result} | {name: np.ones(LANES)}
+    data[f"{name}_standard_error"] = np.full(LANES, 0.1)
+    found = Result(["load"], [*result.variables.values(), *more], data, {}, {})
+    drawn = bifurcation(Figure().subplots(), found, name)
+    ends = [one[:, 1] for one in drawn.parts["bars"].get_segments() if len(one)]
+    np.testing.assert_allclose(ends, [[0.8, 1.2]] * (LANES - 1))  # One lane diverged.
+    assert drawn.points.axes.get_ylim()[1] > 1.2
+    assert any("standard errors" in one.get_text() for one in drawn.legend.get_texts())

@@ -4,6 +4,7 @@ What a page shows for thousands of lanes is run with a few of them and short rec
 """
 
 import importlib
+import json
 import re
 import shlex
 import tomllib
@@ -23,6 +24,7 @@ from .commands import run_module
 
 CLONE = Path(__file__).resolve().parents[2]
 ROOT_PAGES = [CLONE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+NOTEBOOKS = sorted((CLONE / "docs" / "tutorials").glob("*.ipynb"))
 PAGES = [*ROOT_PAGES, *sorted((CLONE / "docs").rglob("*.md"))]
 NAMES = [str(page.relative_to(CLONE)) for page in PAGES]
 SITE = run_path(str(CLONE / "docs" / "site" / "generated.py"))
@@ -34,7 +36,6 @@ SHORT += ("outputs.section_points=8",)
 ALSO = {
     # Whole cycles of a third of the mesh order, and of both gears.
     "orders.h5": ("integration.recorded_periods=30",),
-    "inspection.toml": ("sweep.count=2", "integration.recorded_periods=798"),
     "sweeps/grades.toml": (
         *(
             "pitch_error.realisations=2",
@@ -54,11 +55,20 @@ TOO_LONG = {"reproduce", "identify", "control", "explore", "accuracy", "merge"}
 """Commands whose own tests run them on small cases; here they are only read."""
 
 RUN = ("docs/getting-started.md", "docs/gallery/README.md")
-RUN += tuple(name for name in NAMES if re.match("docs/(tutorials|how-to)/(?!index|read)", name))
+RUN += tuple(name for name in NAMES if re.match("docs/how-to/(?!index|read)", name))
 """Pages whose commands and Python blocks are run, in their order, in one folder each.
 
 `test_api_page` runs the Python blocks of the others.
 """
+
+
+def words_of(page: Path) -> str:
+    """Return the text of a page, of a notebook that between its cells of code."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix != ".ipynb":
+        return text
+    cells = json.loads(text)["cells"]
+    return "\n\n".join("".join(one["source"]) for one in cells if one["cell_type"] == "markdown")
 
 
 def blocks(name: str) -> list[tuple[str, str, str]]:
@@ -82,14 +92,14 @@ def commands(text: str) -> list[list[str]]:
 
 def anchors(page: Path) -> set[str]:
     """Return the anchors of the headings of a page."""
-    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = re.sub(r"```.*?```", "", words_of(page), flags=re.DOTALL)
     heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", one.lower()).strip().replace(" ", "-") for one in heads}
 
 
 def broken(page: Path) -> list[str]:
     """Return the links and pictures of a page that lead to no file or no heading."""
-    text = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = re.sub(r"```.*?```|`[^`\n]*`", "", words_of(page), flags=re.DOTALL)
     wrong = []
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         path, _, anchor = target.partition("#")
@@ -112,9 +122,9 @@ def test_the_readme_is_short_and_keeps_its_two_commands():
     assert found["tests"] == 'pip install -e ".[test]" && pytest'
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_link_leads_somewhere(name):
-    assert broken(CLONE / name) == []
+@pytest.mark.parametrize("page", [*PAGES, *NOTEBOOKS], ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page):
+    assert broken(page) == []
 
 
 def test_a_broken_link_is_found(tmp_path):
@@ -126,7 +136,13 @@ def test_a_broken_link_is_found(tmp_path):
 def test_every_page_can_be_reached_from_the_navigation():
     listed = set(re.findall(r"[\w./-]+\.(?:md|ipynb)\b", (CLONE / "mkdocs.yml").read_text()))
     there = {str(page.relative_to(CLONE / "docs")) for page in (CLONE / "docs").rglob("*.md")}
-    assert listed == there | GENERATED | {"own_pair.ipynb"}
+    assert listed == there | GENERATED | {f"tutorials/{one.stem}.md" for one in NOTEBOOKS}
+
+
+def test_the_tutorial_and_the_readme_have_the_same_pair():
+    cells = json.loads(NOTEBOOKS[[one.stem for one in NOTEBOOKS].index("own-pair")].read_text())
+    written = "".join(cells["cells"][2]["source"]).removeprefix("%%writefile pair.toml\n")
+    assert [own_pair().strip()] == [written]
 
 
 def test_the_reference_of_the_site_has_all_that_the_program_has():
@@ -141,6 +157,10 @@ def test_the_reference_of_the_site_has_all_that_the_program_has():
         assert f"`{output.name.replace('@', 'STATE')}`" in made["reference/outputs.md"] or (
             "@" in output.name
         )
+    codes = (
+        "| `motion` | 0 `periodic`, 1 `quasi_periodic`, 2 `chaotic`, 3 `unresolved`, 4 `diverged`"
+    )
+    assert codes in made["reference/outputs.md"]
     for name in {*gearchaos.__all__} - {"iso1328"}:
         assert f".{name}\n" in made["reference/python.md"]
 
@@ -149,8 +169,12 @@ def test_links_to_files_that_are_no_pages_become_paths():
     page = SimpleNamespace(file=SimpleNamespace(src_uri="how-to/one.md"))
     config = SimpleNamespace(docs_dir=str(CLONE / "docs"))
     text = "[a](../model.md) [b](../../benchmarks/README.md#c) ![d](../../x.png)"
+    text += " [e](../tutorials/f.ipynb#g)"
     shown = SITE["on_page_markdown"](text, page, config, None)
-    assert shown == "[a](../model.md) b (`benchmarks/README.md`) ![d](../../x.png)"
+    assert (
+        shown
+        == "[a](../model.md) b (`benchmarks/README.md`) ![d](../../x.png) [e](../tutorials/f.md#g)"
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -201,6 +225,11 @@ def run_command(command: str, words: list[str], folder: Path) -> None:
     assert ended.code == 0, (command, words, ended.err)
 
 
+def own_pair() -> str:
+    """Return the configuration of the pair of one's own."""
+    return next(text for language, text, _ in blocks("README.md") if language == "toml")
+
+
 def saved_under(line: str) -> str | None:
     """Return the file under which a line before a block says to save it."""
     found = re.search(r"[Ss]ave (?:this|it) as `([\w.]+)`", line)
@@ -212,8 +241,7 @@ def saved_under(line: str) -> str | None:
 def test_the_commands_and_the_python_of_a_page_run(name, tmp_path, monkeypatch):
     (tmp_path / "sweeps").symlink_to(CLONE / "sweeps")
     monkeypatch.chdir(tmp_path)
-    own = [one for one in blocks("docs/tutorials/own-pair.md") if one[0] == "toml"]
-    Path("pair.toml").write_text(own[0][1], encoding="utf-8")
+    Path("pair.toml").write_text(own_pair(), encoding="utf-8")
     names: dict = {}
     text = (CLONE / name).read_text(encoding="utf-8")
     for language, block, before in blocks(name):

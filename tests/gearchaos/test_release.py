@@ -23,7 +23,7 @@ def test_the_version_is_the_same_everywhere():
 def test_the_paper_is_the_same_everywhere():
     (doi,) = re.findall(r"doi: (\S+)", read("CITATION.cff"))
     assert PROJECT["urls"]["Paper"] == f"https://doi.org/{doi}"
-    assert f"https://doi.org/{doi}" in read("docs/tutorials/paper.md")
+    assert f"https://doi.org/{doi}" in read("docs/tutorials/paper.ipynb")
 
 
 def test_the_workflows_test_every_python_and_system_that_is_declared():

@@ -198,3 +198,14 @@ def test_a_machine_without_gears_has_an_excitation_and_no_mesh():
     # JSON has no NaN; a machine has no static deflection of its own.
     assert "static_deflection" not in found.facts
     assert "NaN" not in json.dumps(found.facts)
+
+
+def test_a_machine_has_eigenfrequencies_without_contact_too():
+    found = known(PAN2021.parent / "two_masses.toml")
+    # Masses of 1, springs of 1 between them and to the ground, hardly damped.
+    wanted = np.sqrt((3.0 + np.array([-1.0, 1.0]) * np.sqrt(5.0)) / 2.0)
+    assert found.free[:, 0] == pytest.approx(wanted, rel=1e-3)
+    assert found.texts["free"] == (
+        "eigenfrequencies 0.618, 1.618 rad per unit of time (no element in contact)"
+    )
+    assert "free" not in known(PAN2021).texts

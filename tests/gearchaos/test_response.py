@@ -218,7 +218,7 @@ def test_the_command_computes_the_values_asked_for(tmp_path, result):
     asked = command("--pitch-error", "12.97", "--pitch-error", "0.2")
     ended = run_module("gearchaos.response", *asked, cwd=tmp_path)
     assert (ended.code, ended.out) == (0, "pan2021_full_response.h5\n")
-    summary = "2 lanes over pitch_error, 3 mesh periods of 192 steps, 0 diverged\n"
+    summary = "2 lanes over pitch_error, 3 periods of 192 steps, 0 diverged\n"
     assert ended.err.endswith(f"gearchaos response: {summary}")
     assert same_data(open_result(tmp_path / "pan2021_full_response.h5"), result)
 

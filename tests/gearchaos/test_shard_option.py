@@ -85,6 +85,16 @@ def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
 
 
+def test_a_shard_without_lanes_says_so_and_the_others_join(tmp_path):
+    few = ("--set", "sweep.count=4")
+    empty = sweep(tmp_path, *few, "--shard", "2/2")
+    assert empty.code == 0
+    assert "shard 2/2 has no lanes: the 4 lanes of the sweep are 1 block" in empty.err
+    assert "kernel" not in empty.err
+    assert sweep(tmp_path, *few, "--shard", "1/2").code == 0
+    assert run_module("gearchaos.merge", "gears.h5", cwd=tmp_path).code == 0
+
+
 def test_shards_of_another_configuration_are_refused_with_the_key(tmp_path):
     assert sweep(tmp_path, *COUNT, "--shard", "1/2").code == 0
     other = sweep(tmp_path, *COUNT, "--shard", "2/2", "--set", "groups.damping_ratio=0.06")

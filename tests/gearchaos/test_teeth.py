@@ -169,7 +169,11 @@ def test_pairs_that_share_the_load_part_where_they_differ_by_more_than_it_bends_
     told = "of the lanes tooth pairs that share the load differ by up to"
     for times, parts in ((19.9, True), (20.1, False)):
         slope["groups"] = {**slope["groups"], "load": times * along * cosine}
-        assert (told in noted(**slope)) == parts
+        said = noted(**slope)
+        assert (told in said) == parts
+        # The pair has a length scale of 50 um, and so has its first and third tooth 20 um apart.
+        assert ("by up to 18.6 um, more than the static deflection there (18.6 um" in said) == parts
+        assert ("raise operation.torque_Nm or groups.load" in said) == parts
 
 
 def test_the_printed_form_says_what_it_makes_of_errors_of_teeth():

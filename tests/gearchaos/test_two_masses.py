@@ -4,6 +4,7 @@ The stored values come from event-located matrix exponentials, with shooting and
 """
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 import gearchaos
+
+from .commands import run_module
 
 CONFIG = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
@@ -63,3 +66,27 @@ def test_the_linear_motion_reaches_the_stop_at_the_grazing_points(exact):
         motion = system(frequency, start).integrate(1)
         assert (np.abs(response[0]) > 1.0) == (not meets)
         assert np.ptp(motion.states[:, 0]) / 2.0 == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_what_it_prints_and_draws_has_no_words_of_gears(tmp_path):
+    few = ("sweep.count=3", "integration.transient_periods=60", "integration.recorded_periods=100")
+    words = [word for one in (*few, "start.carry=none") for word in ("--set", one)]
+    calls = (
+        ("sweep", str(CONFIG), *words),
+        ("response", "two_masses.h5", "--at", "0.7", "-o", "lane.h5"),
+        ("plot", "lane.h5", "--format", "svg"),
+        ("plot", "two_masses.h5", "--format", "svg"),
+        ("branches", "two_masses.h5", "--periods", "1"),
+        ("info", "two_masses.h5", "--json"),
+        ("info", "lane.h5", "--json"),
+    )
+    said = [run_module(f"gearchaos.{name}", *words, cwd=tmp_path) for name, *words in calls]
+    assert [one.code for one in said] == [0] * len(said)
+    written = [path.read_text(encoding="utf-8") for path in tmp_path.glob("*.svg")]
+    assert len(written) == 2
+    for text in (*(one.out + one.err for one in said), *written):
+        # The name of the variable mesh_period is that of the format.
+        assert not re.findall(r"mesh (?:period|freq)|flank|\bgears?\b|omega_h|scaling freq", text)
+    every = "".join(one.out + one.err for one in said)
+    assert "(stop, upper side)" in every and '"time in excitation periods"' in every

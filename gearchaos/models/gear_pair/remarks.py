@@ -35,7 +35,7 @@ def remarks(
     """
     yield from _inspected(config)
     if system.repeats_after > 1:
-        yield _parting_pairs(system)
+        yield _parting_pairs(system, parameters.get(LENGTH))
         yield _printed_gaps(config)
     for path, table in tables_in(config.mesh, "mesh"):
         yield note_of(path, table)
@@ -90,8 +90,11 @@ def _printed_gaps(config: GearPairTables) -> str:
     )
 
 
-def _parting_pairs(system: GearPairs) -> str:
-    """Return where tooth pairs in mesh together differ by more than the load bends them."""
+def _parting_pairs(system: GearPairs, length_um: Floats | None) -> str:
+    """Return where tooth pairs in mesh together differ by more than the load bends them.
+
+    ``length_um``: the length scale b' of a physical pair, one or that of each lane.
+    """
     if system.teeth is None:
         return ""
     groups, cosine = system.groups, np.cos(system.groups.base_helix_angle)
@@ -99,13 +102,21 @@ def _parting_pairs(system: GearPairs) -> str:
     projection = 1.0 if system.physical else cosine
     spread = _largest_spread(system.teeth)[system.teeth.profile]
     apart = np.abs(groups.error_amplitude) * projection * spread
-    parting = np.mean(apart > np.abs(groups.load) / cosine)
-    if parting == 0.0:
+    bent = np.abs(groups.load) / cosine
+    parting = apart > bent
+    if not parting.any():
         return ""
+    scale, unit = (1.0, "b'") if length_um is None else (length_um, "um")
+    worst, below = (
+        np.max(apart * scale),
+        np.min(np.broadcast_to(bent * scale, apart.shape)[parting]),
+    )
     return (
-        f"in {parting:.0%} of the lanes tooth pairs that share the load differ by up to "
-        f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
-        "while the others carry, which the model leaves out"
+        f"in {parting.mean():.0%} of the lanes tooth pairs that share the load differ by up to "
+        f"{worst:.3g} {unit}, more than the static deflection there ({below:.3g} {unit} at least); "
+        "single pairs may then part while the others carry, which the model leaves out: raise "
+        "operation.torque_Nm or groups.load, or take gears of a finer grade, and do not rely on "
+        "the loads of these lanes"
     )
 
 

@@ -12,7 +12,7 @@ from gearchaos_kernels.models.linear.system import LinearSystems
 from gearchaos.arrays import Array, Floats
 from gearchaos.models.linear.configuration import MachineConfiguration
 from gearchaos.models.linear.machine import Kinds, Machine
-from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
+from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, TERMS, catalogue_of
 from gearchaos.models.protocol import Model, accelerations
 from gearchaos.models.stiffness_table import note_of, tables_in
 from gearchaos.outputs.listing import Catalogue
@@ -26,6 +26,9 @@ class MachineModel(Model):
     shared_inputs = "nothing but their start"
     units: Mapping[Quantity, str] = MappingProxyType({})
     angle = ""
+    terms: Mapping[str, str] = TERMS
+    rate_words = "rad per unit of time"
+    free_words = "no element in contact"
 
     def __init__(self, config: MachineConfiguration) -> None:
         self._kinds = config.kinds_of_elements
@@ -34,7 +37,7 @@ class MachineModel(Model):
     @cached_property
     def catalogue(self) -> Catalogue:  # type: ignore[override]
         """All outputs that a result may have."""
-        return catalogue_of(self._kinds, self.units, self.angle)
+        return catalogue_of(self._kinds, self.units, self.angle, self.terms)
 
     def system(
         self, config: MachineConfiguration, values: Mapping[str, Floats], effects: Collection[str]

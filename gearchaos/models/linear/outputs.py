@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from gearchaos.models.linear.machine import Kinds
 from gearchaos.outputs import catalogue
@@ -44,12 +45,28 @@ FORCES_IN_TIME_PART = Part(
     in_time=True,
 )
 
+TERMS = MappingProxyType(
+    {
+        "mesh period": "excitation period",
+        "mesh frequency": "excitation frequency",
+        "driving flank": "upper side",
+        "back flank": "lower side",
+        "between the flanks": "between the sides",
+    }
+)
+"""Terms of a machine without gears: an element pushes where its gap is above or below its range."""
 
-def catalogue_of(kinds: Kinds, units: Mapping[Quantity, str], angle: str = "") -> Catalogue:
+
+def catalogue_of(
+    kinds: Kinds,
+    units: Mapping[Quantity, str],
+    angle: str = "",
+    terms: Mapping[str, str] = MappingProxyType({}),
+) -> Catalogue:
     """Return the outputs of machines with these coordinates and elements.
 
     ``units``: of each quantity, none for pure numbers; ``angle``: end of the names of coordinates
-    that are angles.
+    that are angles; ``terms``: in place of those of gears.
     """
     motions = [_motion(name, bool(angle) and name.endswith(angle)) for name in kinds.coordinates]
     elements = tuple(
@@ -74,6 +91,7 @@ def catalogue_of(kinds: Kinds, units: Mapping[Quantity, str], angle: str = "") -
             ),
         },
         units=units,
+        terms=terms,
     )
 
 

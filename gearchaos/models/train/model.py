@@ -29,6 +29,7 @@ class TrainModel(MachineModel):
         }
     )
     angle = "_angle"
+    terms = MappingProxyType({})
     exciter = "mesh"
     contact_words = "mean mesh stiffness, all teeth in contact"
 

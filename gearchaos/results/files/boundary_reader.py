@@ -70,9 +70,7 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bou
         name: stored.values_of(name, one) for name, one in datasets.items() if texts[name] is None
     }
     notes = {name: stored.scalars_of(datasets[name]) for name in arrays}
-    described = {
-        name: described_as(name, datasets[name], notes[name], OF_SPECIAL) for name in arrays
-    }
+    described = {name: described_as(name, datasets[name], notes[name], metadata) for name in arrays}
     names = str(metadata[PARAMETERS]).split()
     states = str(notes[STATE]["flag_meanings"]).split()
     boundaries = tuple(

@@ -132,7 +132,7 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bra
         name: stored.values_of(name, one) for name, one in datasets.items() if texts[name] is None
     }
     notes = {name: stored.scalars_of(datasets[name]) for name in arrays}
-    described = {name: described_as(name, datasets[name], notes[name]) for name in arrays}
+    described = {name: described_as(name, datasets[name], notes[name], metadata) for name in arrays}
     states = str(notes[STATE]["flag_meanings"]).split()
     sections = [described[SECTION + state] for state in states]
     known = {"arclength", "stable", "lyapunov_exponent", "branch_of_point", POINT}
@@ -166,12 +166,16 @@ def _read(datasets: Mapping[str, h5py.Dataset], metadata: dict[str, Any]) -> Bra
 
 
 def described_as(
-    name: str, dataset: h5py.Dataset, notes: Mapping[str, Any], start: str = OF_SPECIAL
+    name: str,
+    dataset: h5py.Dataset,
+    notes: Mapping[str, Any],
+    metadata: Mapping[str, Any],
 ) -> Variable:
     """Return the description of a variable without its values."""
     units, long_name, symbol = (str(notes.get(key, "")) for key in ("units", "long_name", "symbol"))
     dims = stored.dims_of(name, dataset, notes, {})
-    dtype, scale = stored.dtype_of(name, dataset), scale_of(name.removeprefix(start))
+    dtype = stored.dtype_of(name, dataset)
+    scale = scale_of(name.removeprefix(OF_SPECIAL), metadata)
     return Variable(name, dims, dtype, units, long_name, symbol, scale=scale)
 
 

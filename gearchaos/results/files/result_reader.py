@@ -139,7 +139,10 @@ def _read(file: h5py.File, rows: bool) -> Contents:
                 data[name] = stored.values_of(name, dataset)
             more = {**_wording(notes), "fill_value": notes.get("_FillValue")}
             more |= {"flags": _words(notes, "flag_meanings")}
-            more |= {"errors": _words(notes, "ancillary_variables"), "scale": scale_of(name)}
+            more |= {
+                "errors": _words(notes, "ancillary_variables"),
+                "scale": scale_of(name, metadata),
+            }
             variables[name] = Variable(name, dims, stored.dtype_of(name, dataset), **more)
     _check_variables(axes, variables, data)
     for dim in sizes.keys() - {HARMONIC}:
@@ -156,7 +159,12 @@ def _read(file: h5py.File, rows: bool) -> Contents:
             raise UnfitError(f"holds a parameter {name} that is none")
         values = stored.values_of(name, dataset)
         value = values if dims else float(values)
-        more = {**_wording(notes), "values": value, "origin": origin, "scale": scale_of(name)}
+        more = {
+            **_wording(notes),
+            "values": value,
+            "origin": origin,
+            "scale": scale_of(name, metadata),
+        }
         parameters[name] = Variable(name, dims, "float64", **more)
     return list(variables.values()), data, parameters, metadata
 

@@ -22,7 +22,7 @@ def physical_basins(found: Basins) -> Basins:
     swept = found.parameter in result
     values = np.asarray(result[found.parameter] if swept else found.values, dtype=np.float64)
     states = found.result.variables[STATE].flags
-    scales: dict[str, Scale] = {state: scale_of(state) for state in states}
+    scales: dict[str, Scale] = {state: scale_of(state, result.metadata) for state in states}
     names = {name for one in found.basins for name in (LARGEST_EXPONENT, *one.means)}
     scales |= {n: found.result.variables[n].scale for n in names if n in found.result.variables}
     units, factors = dict[str, str](), dict[str, Floats]()
