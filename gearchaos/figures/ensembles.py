@@ -43,8 +43,8 @@ LOSES_CONTACT = {"fmt": "^", "color": VERMILION, "label": "loses contact"}
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
 """Colours of attractors by number, used cyclically; they differ in lightness when grey."""
 
-SECTION_POINTS = {"ls": "", "marker": "o", "ms": 5.0, "mfc": "none", "mec": BLACK, "mew": 0.6}
-SECTION_POINTS |= {"label": "motion at the section"}
+SECTION_POINTS: dict[str, Any] = {"mfc": "none", "mec": BLACK, "mew": 0.6}
+SECTION_POINTS |= {"ls": "", "marker": "o", "ms": 5.0, "label": "motion at the section"}
 """Look of the circles in basins, in their legend."""
 
 MOST_POINTS = 500  # Most section points drawn per attractor.
