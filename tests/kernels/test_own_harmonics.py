@@ -6,6 +6,9 @@ The reference is an adaptive method of order 8 that restarts at every crossing, 
 import numpy as np
 import pytest
 from gearchaos_kernels import GearPairs, Plan, integrate
+from gearchaos_kernels.batch import scene_of
+from gearchaos_kernels.evaluation import WITHOUT_LOOP, jacobian
+from gearchaos_kernels.scene import provider_of
 
 from .exact import Exact
 from .reference import COSINE, NO_AXIAL, SINE, TORSION_ONLY, columns, drawn_teeth, pan2021
@@ -113,3 +116,12 @@ def test_branches_have_the_extremes_of_each_lane():
     variation = ((COSINES + 1j * SINES) @ turns).real * GROUPS.stiffness_variation_scale[:, None]
     expected = [1.0 + variation.min(axis=1), 1.0 + variation.max(axis=1), np.zeros(3)]
     assert PAIRS.branch_stiffnesses()[:, :, 0] == pytest.approx(np.array(expected), abs=1e-3)
+
+
+def test_a_system_without_own_harmonics_has_no_coefficients_of_them():
+    for system in (PAIRS, PAIRS.linearised(), PAIRS.of([1]), PAIRS.of_unit_inputs()):
+        names = provider_of(scene_of(system, WITHOUT_LOOP).model).lane._fields
+        assert system.coefficients(np.ones(system.lanes)).shape == (system.lanes, len(names))
+    shared = GearPairs(NO_AXIAL, GROUPS, COSINE, SINE)
+    in_contact = np.ones((3, 1))
+    assert np.array_equal(jacobian(PAIRS, in_contact), jacobian(shared, in_contact))
