@@ -195,14 +195,20 @@ class Lanes:
 def _kept(one: ParameterValue, names: Sequence[str], sizes: Sequence[int]) -> Variable:
     """Return a parameter as a result variable; ``names``, ``sizes``: of the swept axes."""
     value, origin = one.value, one.origin
-    dims: tuple[str, ...] = (HARMONIC,) if one.is_list else ()
-    if np.ndim(value) > 0 and not dims:
+    harmonic: tuple[str, ...] = (HARMONIC,) if one.is_list else ()
+    shape = np.shape(value)
+    over, of_each = shape[: len(shape) - len(harmonic)], shape[len(shape) - len(harmonic) :]
+    dims = harmonic
+    if over:
         origin = "swept"
-        along = [n for n, size in enumerate(np.shape(value)) if size > 1]
+        along = [n for n, size in enumerate(over) if size > 1]
         # With one value per axis, the shape does not show on which axes the parameter depends.
         along = along or list(range(len(names)))
-        dims = tuple(names[n] for n in along)
-        value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
+        dims = (*(names[n] for n in along), *harmonic)
+        whole = [sizes[n] for n in along]
+        value = np.broadcast_to(
+            np.reshape(value, [*[over[n] for n in along], *of_each]), [*whole, *of_each]
+        )
     texts = one.units, one.long_name, one.symbol
     return Variable(one.name, dims, "float64", *texts, values=value, origin=origin)
 

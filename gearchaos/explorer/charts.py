@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 from gearchaos.arrays import Array
 from gearchaos.explorer.shades import COLOURS
 from gearchaos.explorer.text import plain_text
+from gearchaos.figures.diagrams import waterfall
 from gearchaos.figures.labels import axis_label
-from gearchaos.figures.lanes import diagram_lanes, map_axes
+from gearchaos.figures.lanes import cell_edges, diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.style import BLACK
-from gearchaos.outputs.names import LARGEST_EXPONENT
+from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER
 from gearchaos.results.reading.result import Result
 
 Charts = tuple[list[Any], dict[str, str]]
@@ -61,6 +62,9 @@ def diagram(result: Result, variable: str) -> Charts:
         # Datashader cannot count points whose range is a single value: the limits widen it.
         sides = zip(_dimensions(result, result.axis, name), (lanes.limits, height), strict=True)
         dimensions = [one.clone(soft_range=limits) for one, limits in sides]
+        if result.dims(name)[-1:] == (ORDER,):
+            charts.append(_waterfall(result, name))
+            continue
         if charts:
             chart = downsample1d(hv.Curve(points, *dimensions), width=DRAWN)
             look = {"color": BLACK, "line_width": 1.0, "height": 240, "show_grid": True}
@@ -69,6 +73,25 @@ def diagram(result: Result, variable: str) -> Charts:
             look = {"cmap": GREYS, "cnorm": "eq_hist", "height": 340}
         charts.append(chart.opts(responsive=True, **frame, **look))
     return charts, {}
+
+
+def _waterfall(result: Result, variable: str) -> Any:
+    """Draw amplitudes over one swept parameter, one row per mesh order, as `figures.waterfall`."""
+    axes = Figure().subplots()
+    image: Any = waterfall(axes, result, variable)
+    ticks = [
+        *zip(axes.get_yticks(), (one.get_text() for one in axes.get_yticklabels()), strict=True)
+    ]
+    numbers = np.ma.filled(image.get_array().astype(float), np.nan)
+    edges = cell_edges(np.unique(diagram_lanes(result).parameter)), np.arange(len(ticks) + 1) - 0.5
+    across, _ = _dimensions(result, result.axis, variable)
+    along = hv.Dimension("order", label=axes.get_ylabel())
+    value = hv.Dimension(VALUE, label=plain_text(axis_label(result, variable)))
+    mesh = hv.QuadMesh((*edges, numbers.reshape(len(ticks), -1)), [across, along], value)
+    shades = image.cmap(np.linspace(0.0, 1.0, COLOURS))
+    look: Any = {"cmap": [to_hex(one) for one in shades], "clim": image.get_clim(), "logz": True}
+    look |= {"colorbar": True, "height": 340, "yticks": ticks}
+    return rasterize(mesh, aggregator=highest()).opts(responsive=True, **look)
 
 
 def two_parameter_map(result: Result, variable: str) -> Charts:

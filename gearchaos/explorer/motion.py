@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures import response as figures
-from gearchaos.figures.response_page import SHOWN_PERIODS
+from gearchaos.figures.response_page import SHOWN_PERIODS, shaft_spectrum
 from gearchaos.outputs.names import acceleration_of
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
 
 SCALES = ("linear", "linear", "log", "linear")
@@ -57,16 +58,21 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     figures.time_history(history, motion, 0, coordinate, **late)
     figures.phase_portrait(portrait, motion, 0, coordinate)
     figures.poincare_section(portrait, motion, 0, coordinate)
-    figures.amplitude_spectrum(spectrum, motion, 0, acceleration_of(coordinate))
+    excitation, acceleration = excitation_of(motion.metadata), acceleration_of(coordinate)
+    if excitation.of_teeth:
+        shaft_spectrum(spectrum, motion, 0, acceleration)
+    else:
+        figures.amplitude_spectrum(spectrum, motion, 0, acceleration)
     for name in figures.forces_of(motion)[:1]:
         figures.time_history(force, motion, 0, name, **late)
         figures.contact_strip(force, motion, 0, name)
     for panel, axes in zip(shown, drawn, strict=True):
-        _show(panel, axes)
+        # Orders of the driving shaft are multiples of those of the mesh.
+        _show(panel, axes, excitation.driving_teeth or 1 if axes is spectrum else 1)
 
 
-def _show(shown: Any, axes: Axes) -> None:
-    """Replace the content of a panel by that of axes of matplotlib."""
+def _show(shown: Any, axes: Axes, times: int) -> None:
+    """Replace the content of a panel by that of axes of matplotlib, with x in another unit."""
     shown.xaxis.axis_label = plain_text(axes.get_xlabel())
     shown.yaxis.axis_label = plain_text(axes.get_ylabel())
     shown.renderers, items = [], []
@@ -80,8 +86,25 @@ def _show(shown: Any, axes: Axes) -> None:
         left, bottom, right, top = np.reshape(boxes, (-1, 4)).T
         color = to_hex(one.get_edgecolor()[0])
         if isinstance(one, LineCollection):
-            shown.segment(left, bottom, right, top, color=color)
+            ends = times * left, bottom, times * right, top
+            edges: Any = one.get_edgecolor()
+            items += _segments(shown, ends, [to_hex(edge) for edge in edges], axes)
         else:
             strip = shown.quad(left, right, top, bottom, color=color, y_range_name="strip")
             items.append(LegendItem(label=str(one.get_label()), renderers=[strip]))
     shown.above[0].items = items
+
+
+def _segments(shown: Any, ends: Any, colours: list[str], axes: Axes) -> list[LegendItem]:
+    """Draw lines of one colour, or of a colour each; return the entries of their legend."""
+    each = np.broadcast_to(colours, ends[0].shape)
+    drawn = {
+        colour: shown.segment(*(end[each == colour] for end in ends), color=colour)
+        for colour in dict.fromkeys(colours)
+    }
+    legend = axes.get_legend()
+    handles: list[Any] = legend.legend_handles if legend else []
+    return [
+        LegendItem(label=str(one.get_label()), renderers=[drawn[to_hex(one.get_color())]])
+        for one in handles
+    ]

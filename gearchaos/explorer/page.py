@@ -34,11 +34,13 @@ from gearchaos.outputs.catalogue import DEFAULT_PERIODS
 from gearchaos.outputs.names import (
     LABELS,
     LARGEST_EXPONENT,
+    ORDER,
     SECTION,
     STATE,
     STATUS,
     coordinate_text,
 )
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text
 
@@ -57,6 +59,10 @@ HINT: Any = {
 # Side by side where the window is wide enough.
 HALF = {"flex": "1 1 560px", "min-width": "0"}
 QUARTER = {"flex": "1 1 270px", "min-width": "0"}
+
+
+MOST_PERIODS = 1000
+"""Mesh periods of a motion at most, to resolve the orders of shafts."""
 
 
 class ExplorerPage:
@@ -80,8 +86,12 @@ class ExplorerPage:
         self._others = [axis for axis in result.axes if axis not in self._swept]
         recorded = result.metadata.get("recorded_periods")
         self._periods = DEFAULT_PERIODS
+        repeats = excitation_of(result.metadata).excitation_period
+        if repeats <= MOST_PERIODS:
+            # Lines of the shafts are resolved by a whole period of the excitation.
+            self._periods = max(DEFAULT_PERIODS, repeats)
         if isinstance(recorded, int) and recorded > 0:
-            self._periods = min(DEFAULT_PERIODS, recorded)
+            self._periods = min(self._periods, recorded)
         choices: dict[str, Any] = {"variable": _worded(result, self._variables())}
         for axis in self._others:
             choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
@@ -152,7 +162,9 @@ class ExplorerPage:
     def _variables(self) -> list[str]:
         """Return the names of all variables to draw, the default first."""
         if len(self._swept) == 1:
-            return diagram_variables(self._result)
+            over_orders = (*self._result.axes, ORDER)
+            amplitudes = [name for name in self._result if self._result.dims(name) == over_orders]
+            return [*diagram_variables(self._result), *amplitudes]
         of_lanes = [name for name in self._result if self._result.dims(name) == self._result.axes]
         return sorted(of_lanes, key=lambda name: name != LABELS[0])
 

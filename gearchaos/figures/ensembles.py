@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
 from matplotlib.container import Container
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 
@@ -41,6 +42,10 @@ LOSES_CONTACT = {"fmt": "^", "color": VERMILION, "label": "loses contact"}
 
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
 """Colours of attractors by number, used cyclically; they differ in lightness when grey."""
+
+SECTION_POINTS: dict[str, Any] = {"mfc": "none", "mec": BLACK, "mew": 0.6}
+SECTION_POINTS |= {"ls": "", "marker": "o", "ms": 5.0, "label": "motion at the section"}
+"""Look of the circles in basins, in their legend."""
 
 MOST_POINTS = 500  # Most section points drawn per attractor.
 
@@ -312,6 +317,7 @@ def basins_page(
         else:
             basins(axes, found)
             drawn = [Patch(**_look(b), lw=0.3, label=_in_words(b)) for b in found.basins]
+            drawn.append(Line2D([], [], **SECTION_POINTS))
             fixed = fixed | {found.parameter: float(found.values[0])}
         few_ticks(axes, 8, 6)
         figure.suptitle(in_words(found.result, fixed))

@@ -41,14 +41,20 @@ def label_of(variable: Variable, line_length: int = 60) -> str:
     wording = " ".join((variable.long_name or variable.name).split())
     symbol, unit = _formula(variable.symbol), _unit(variable)
     words = [plain(word) for word in (wording[:1].upper() + wording[1:]).split(" ")]
-    # The symbol stays on the line of the last word.
-    if symbol:
+    # The symbol stays on the line of the last word. A name in upright letters says nothing new.
+    if symbol and not _names(variable.symbol, wording):
         words[-1] += f", {symbol}"
     if unit:
         words.append(f"({unit})")
     # The narrowest of all layouts with the fewest lines: its lines have similar lengths.
     fewest = min((_broken(words, length) for length in range(1, line_length + 1)), key=len)
     return "\n".join(fewest)
+
+
+def _names(symbol: str, wording: str) -> bool:
+    """Whether a symbol is a name in upright letters that the wording contains."""
+    name = re.fullmatch(r"\$\\mathrm\{(.+)\}\$", symbol)
+    return name is not None and name[1].replace(r"\ ", " ") in wording
 
 
 def unit_of(result: Result, name: str) -> str:

@@ -157,12 +157,11 @@ def _draw_panels(panels: dict[str, Axes], motion: _Motion) -> None:
     if motion.whole:
         _draw_phase_plane(panels["p"], panels["s"], motion)
     transformed = acceleration_of(variable) if motion.whole else variable
-    look: dict[str, Any] = {"highest": HIGHEST_ORDER, "in_orders": True} if motion.teeth else {}
-    lines = response.amplitude_spectrum(panels["f"], result, lane, transformed, **look)
     if motion.teeth:
         _pitch_error_above(panels["e"], history, motion)
-        resolved = round(motion.shown[1]) >= motion.excitation.excitation_period
-        _in_shaft_orders(panels["f"], lines, motion.excitation, resolved)
+        shaft_spectrum(panels["f"], result, lane, transformed)
+    else:
+        response.amplitude_spectrum(panels["f"], result, lane, transformed)
 
 
 def _draw_phase_plane(portrait: Axes, section: Axes, motion: _Motion) -> None:
@@ -210,6 +209,15 @@ def _pitch_error_above(top: Axes, history: Axes, motion: _Motion) -> None:
     remark(history, f"excitation period: {motion.excitation.excitation_period} mesh periods")
     top.set_xlabel("")
     top.tick_params(labelbottom=False)
+
+
+def shaft_spectrum(axes: Axes, result: Result, lane: int, variable: str) -> None:
+    """Draw a spectrum over orders of the driving shaft, for teeth with errors of their own."""
+    excitation = excitation_of(result.metadata)
+    look: dict[str, Any] = {"highest": HIGHEST_ORDER, "in_orders": True}
+    lines = response.amplitude_spectrum(axes, result, lane, variable, **look)
+    resolved = round(response.mesh_periods(result)[-1]) >= excitation.excitation_period
+    _in_shaft_orders(axes, lines, excitation, resolved)
 
 
 def _in_shaft_orders(

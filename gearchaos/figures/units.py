@@ -1,5 +1,7 @@
 """Explanations of the scales that axis labels name as units, at the foot of a page."""
 
+import re
+
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -16,6 +18,8 @@ def explained_units(figure: Figure) -> str:
     texts = [str(one.get_text()) for one in figure.findobj(Text)]
     units = " ".join(text[text.rfind("(") :] for text in texts if "(unit $" in text)
     units += " ".join(text for text in texts if r"per unit of $\tau$" in text)
+    # A value with its unit, such as in a title.
+    units += " ".join(" ".join(re.findall(r"= [-+.\de]+ (\$[^$]+\$)", text)) for text in texts)
     found = [symbol for symbol in EXPLAINED if symbol in units]
     if r"\tau" in found and _OF_TIME not in found:
         found.insert(0, _OF_TIME)

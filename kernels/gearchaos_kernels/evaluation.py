@@ -102,9 +102,10 @@ def jacobian(system: LaneSystem, stiffnesses: Floats) -> Floats:
     scales = system.scales(per_tau)
     result = np.empty((*scales.shape, scales.shape[1]))
     # Without excitation: it is no part of the linearisation and would only be compiled in vain.
-    scene = scene_of(system.linearised(), WITHOUT_LOOP)
+    linear = system.linearised()
+    scene = scene_of(linear, WITHOUT_LOOP)
     slopes = np.ascontiguousarray(stiffnesses, dtype=np.float64)
-    _differentiate(system.coefficients(per_tau), scales, slopes, result, scene)
+    _differentiate(linear.coefficients(per_tau), scales, slopes, result, scene)
     return result
 
 

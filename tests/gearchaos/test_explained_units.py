@@ -22,6 +22,8 @@ from .test_figure_lines import steps
             "Exponent (per unit of $\\tau$)",
             "$\\omega_h$: scaling frequency, $\\tau$: $\\omega_h t$",
         ),
+        ("$\\Omega$ = 4 $\\omega_h$", "$\\omega_h$: scaling frequency"),
+        ("$P$ = 1.04", ""),
         ("Displacement (\N{MICRO SIGN}m)", ""),
         ("Share of starts", ""),
     ],

@@ -27,7 +27,7 @@ SHORT += ("outputs.section_points=5",)
 WITHOUT_PHASE = "pitch_error.phase_deg=0.0"
 LOAD = "second_sweep={parameter='load', values=[0.1, 0.2]}"
 KINDS = {
-    "diagram": ("gears", (WITHOUT_PHASE, "sweep.count=4")),
+    "diagram": ("gears", (WITHOUT_PHASE, "sweep.count=4", "outputs.orders=[1, 2]")),
     "carried": ("gears", (WITHOUT_PHASE, "sweep.count=4", "start.carry='both'")),
     "map": ("gears", (WITHOUT_PHASE, "sweep.count=3", LOAD)),
     "grades": (
@@ -42,6 +42,7 @@ MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").tex
 LABELS = """[...Bokeh.documents[0]._all_models.values()]
     .filter(one => one.type == "Figure").map(one => one.left[0].axis_label)"""
 """Labels at the vertical axes of all charts that the page has drawn."""
+BELOW = LABELS.replace("left", "below")
 FAULT = f"b[style*='{VERMILION}']"
 
 
@@ -79,18 +80,24 @@ def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
             # A chart, and the four panels of the motion.
             page.locator(".bk-Figure >> nth=4").wait_for()
             page.locator("pre:has-text('response')").wait_for()
-            seen = entries_drawn(page, gearchaos.open_result(path))
+            result = gearchaos.open_result(path)
+            seen = entries_drawn(page, result)
+            # The spectrum of teeth with errors of their own has orders of their shaft.
+            below = page.evaluate(BELOW)
+            assert ("Order of the driving shaft (mesh: 21)" in below) == (kind == "grades")
             page.close()
         finally:
             server.terminate()
     assert "Traceback" not in (tmp_path / "said").read_text()
     assert {"section_delta_5", "lyapunov_exponent"} & {*seen}
+    assert ("amplitude_transmission_error" in seen) == (kind == "diagram")
 
 
 def variables_of(result: gearchaos.Result) -> list[str]:
     """Return the variables of the menu in their order."""
     if len(swept_axes(result)) == 1:
-        return diagram_variables(result)
+        over_orders = [name for name in result if result.dims(name) == (*result.axes, "order")]
+        return [*diagram_variables(result), *over_orders]
     of_lanes = [name for name in result if result.dims(name) == result.axes]
     return sorted(of_lanes, key=lambda name: name != "motion")
 
@@ -113,6 +120,7 @@ def entries_drawn(page, result: gearchaos.Result) -> list[str]:
                 drawn.append(text)
                 shown = text if len(swept_axes(result)) == 1 else result.axes[0]
                 label = " ".join(plain_text(axis_label(result, shown)).split())
+                label = "Mesh order" if result.dims(text)[-1] == "order" else label
                 page.wait_for_function(
                     f"label => {LABELS}.some(one => one.split(/\\s+/).join(' ') == label)",
                     arg=label,

@@ -91,12 +91,27 @@ def test_contradictory_data_of_a_pair_are_refused_in_a_sentence(data, message):
 
 
 @pytest.mark.parametrize("name", ["helix_angle_deg", "normal_module_mm", "centre_distance_mm"])
-def test_a_sweep_that_would_change_the_harmonics_names_what_else_can_be_done(name):
+def test_a_sweep_gives_every_value_its_own_harmonics(name):
     data = {"tip_diameters_mm": [52.7, 91.9]} if name.startswith("centre") else {}
     values = [67.5, 68.0] if data else [1.8, 2.2]
     sweep = {"parameter": f"pair.{name}", "values": values}
-    with pytest.raises(gearchaos.ConfigurationError, match=r"share one stiffness table.*train"):
-        pair({"sweep": sweep}, **data)
+    speed = {"operation": {"torque_Nm": 50.0, "speed_rpm": 4000.0}}
+    swept = {sweep["parameter"]: np.array(values)}
+    found = system_of(pair({"sweep": sweep, **speed}, **data), swept)
+    for number, value in enumerate(values):
+        alone = harmonics(pair(**{**data, name: value}))
+        own = found.stiffness_cosine[number] - 1j * found.stiffness_sine[number]
+        assert own == pytest.approx(alone, abs=1e-15)
+
+
+def test_too_many_harmonics_for_lanes_of_their_own_are_refused():
+    tables = pair().tables()
+    tables["mesh"]["stiffness"]["harmonics"] = 41
+    tables["operation"]["speed_rpm"] = 4000.0
+    tables["sweep"] = {"parameter": "pair.face_width_mm", "values": [12.0, 18.0]}
+    rule = r"mesh.stiffness.harmonics = 41: gives more than 40 .* pair.face_width_mm changes them"
+    with pytest.raises(gearchaos.ConfigurationError, match=rule):
+        gearchaos.Configuration.from_tables(tables, "my.toml")
 
 
 SIZES = {"normal_module_mm": 2.166, "helix_angle_deg": 20.0, "face_width_mm": 15.0}

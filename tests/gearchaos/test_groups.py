@@ -5,7 +5,6 @@ import pickle
 import numpy as np
 import pytest
 
-from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.derivation import derive_groups
 from gearchaos.models.gear_pair.group_table import GROUP_TABLE, GROUPS_BY_NAME
 from gearchaos.models.gear_pair.groups import resolve_groups
@@ -270,13 +269,14 @@ def test_swept_physical_quantity_gives_one_value_per_lane():
     assert isinstance(groups.load, float)
 
 
-def test_stiffness_shape_that_differs_between_lanes_is_refused_with_a_remedy():
+def test_swept_data_of_the_pair_give_the_harmonics_of_each_lane():
     angles = np.array([15.0, 20.0, 25.0])
     tables = physical(**trapezoid(), pair__helix_angle_deg=angles)
-    with pytest.raises(
-        ConfigurationError, match=r"stiffness_cosine and stiffness_sine in \[groups]"
-    ):
-        resolve_groups(tables, {})
+    swept = resolve_groups(tables, {})
+    for number, angle in enumerate(angles):
+        alone = resolve_groups(physical(**trapezoid(), pair__helix_angle_deg=angle), {})
+        assert np.array_equal(swept.stiffness_cosine[number], alone.stiffness_cosine)
+        assert np.array_equal(swept.stiffness_sine[number], alone.stiffness_sine)
     given = {"stiffness_cosine": [-0.09], "stiffness_sine": [0.09]}
     assert resolve_groups(tables, given).base_helix_angle_deg.shape == (3,)
 

@@ -295,14 +295,15 @@ count = 50
 """
 
 
-def test_a_sweep_of_the_module_of_a_spur_pair_has_one_table_of_stiffness():
+def test_a_sweep_of_the_module_of_a_spur_pair_keeps_its_stiffness():
     config = Configuration.from_toml(TRAPEZOID)
     swept = groups_at(config, axis_values(config))
     assert np.ptp(swept.mesh_frequency) > 0.0
     # The contact ratio in multiples of the module: it does not depend on it.
     one = groups_at(config.at({"pair.normal_module_mm": 2.0}), {})
-    np.testing.assert_allclose(swept.stiffness_cosine, one.stiffness_cosine, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(swept.stiffness_sine, one.stiffness_sine, rtol=0.0, atol=1e-13)
+    cosine, sine = (np.tile(wave, (50, 1)) for wave in (one.stiffness_cosine, one.stiffness_sine))
+    np.testing.assert_allclose(swept.stiffness_cosine, cosine, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(swept.stiffness_sine, sine, rtol=0.0, atol=1e-13)
 
 
 def test_a_sweep_of_the_module_of_a_spur_pair_with_teeth_of_their_own_has_one_table_of_lines():
@@ -319,6 +320,9 @@ def test_a_sweep_of_the_module_of_a_spur_pair_with_teeth_of_their_own_has_one_ta
         "pair.helix_angle_deg=1e-6",
     ],
 )
-def test_a_contact_ratio_that_differs_by_more_than_rounding_is_refused(other):
+def test_a_contact_ratio_that_differs_is_refused_with_teeth_of_their_own(other):
+    teeth = 'kind = "teeth"\nsmoothing = 0.1\ndriving = { cumulative_um = [FP] }'
+    text = TRAPEZOID.replace("amplitude_um = 5.0", teeth.replace("[FP]", str([0.0] * 20 + [3.0])))
+    lanes = Lanes(Configuration.from_toml(text, overrides=[other]))
     with pytest.raises(ConfigurationError, match="would differ between the swept values"):
-        Configuration.from_toml(TRAPEZOID, overrides=[other])
+        lanes.system_of(np.arange(len(lanes)))

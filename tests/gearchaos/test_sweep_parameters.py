@@ -86,6 +86,38 @@ def test_a_sweep_moves_the_motion_and_each_lane_is_the_sweep_of_its_value_alone(
             assert np.array_equal(result[name][2:], alone[name]), name
 
 
+TRAPEZOID = {
+    'shape = "fourier"\ncosine_N_per_um_mm = [-1.202, 0.0, -0.1339]\n'
+    "sine_N_per_um_mm = [1.203, 0.0, -0.1335]": 'shape = "trapezoid"\nharmonics = 3',
+    ', "transverse", "axial"]': "]",
+    '"delta_5", "delta_3"': '"delta_5"',
+}
+
+
+@pytest.mark.parametrize("name", ["helix_angle_deg", "face_width_mm", "normal_module_mm"])
+def test_with_a_trapezoid_each_lane_has_the_stiffness_of_its_value(name, tmp_path, monkeypatch):
+    parameter = f"pair.{name}"
+    monkeypatch.setitem(CHANGES, parameter, TRAPEZOID)
+    monkeypatch.setitem(SPANS, "pair.normal_module_mm", (2.0, 2.4))
+    low, high = SPANS[parameter]
+    result = gearchaos.run(configured(parameter, low, high))
+    assert (result["status"] == 0).all()
+    alone = gearchaos.run(configured(parameter, high, high, count=1))
+    for one in result:
+        if result.dims(one)[0] == result.axis:
+            np.testing.assert_array_equal(result[one][2:], alone[one], err_msg=one)
+    result.save(tmp_path / "swept.h5")
+    kept = gearchaos.open_result(tmp_path / "swept.h5").parameters["stiffness_cosine"]
+    assert kept.dims == (result.axis, "harmonic") and kept.origin == "swept"
+    # The same pair without a sweep of its geometry: one table of stiffness for all lanes.
+    fixed = configured(parameter, low, high).at({parameter: high})
+    fixed = fixed.replace({"sweep": {"parameter": "pitch_error", "values": [1.0]}})
+    shared = gearchaos.run(fixed)
+    assert kept.values[2] == pytest.approx(shared.parameters["stiffness_cosine"].values, abs=1e-15)
+    assert np.ptp(kept.values[:, 0]) > 1e-3
+    assert result["end_state"][2] == pytest.approx(shared["end_state"][0], rel=1e-9)
+
+
 def test_a_sweep_of_two_parameters_is_the_sweep_of_the_first_at_every_value_of_the_second():
     second = "second_sweep={parameter='operation.speed_rpm', values=[9000.0, 8000.0]}"
     text = configured("pitch_error", 0.5, 1.5).resolved_toml()

@@ -6,7 +6,6 @@ That of one tooth pair grows over the smaller of both contact ratios, stays, and
 until the pair has been in mesh for their sum, in mesh periods.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.errors import ConfigurationError
+from gearchaos.models.gear_pair.geometry import Value
 
 MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
@@ -42,17 +42,18 @@ class TrapezoidalStiffness:
     """Stiffness that rises linearly from phase 0 on, stays, falls, stays (Pan 2021, eqs 15-18).
 
     The parts are fractions of the mesh period, none negative, which add up to one; a rise of zero
-    is a jump. ``half_height``: half of the difference between top and bottom, relative to k_m.
+    is a jump. ``half_height``: half of the difference between top and bottom, relative to k_m. Each
+    is a number or an array over lanes.
     """
 
-    rise: float
-    top: float
-    fall: float
-    bottom: float
-    half_height: float
+    rise: Value
+    top: Value
+    fall: Value
+    bottom: Value
+    half_height: Value
 
     @classmethod
-    def from_contact_ratios(cls, transverse: float, overlap: float) -> Self:
+    def from_contact_ratios(cls, transverse: Value, overlap: Value) -> Self:
         """Stiffness proportional to the total length of a helical pair's contact lines.
 
         Measured along the path of contact in base pitches, a tooth's contact line spans a window
@@ -67,18 +68,19 @@ class TrapezoidalStiffness:
         ``transverse``, ``overlap``: eps_alpha > 0 and eps_beta >= 0; zero is a spur pair, whose
         contact length jumps. Raises ValueError if one is outside its range.
         """
-        if not (0.0 < transverse < math.inf and 0.0 <= overlap < math.inf):
+        if not np.all((transverse > 0.0) & (overlap >= 0.0) & np.isfinite(transverse + overlap)):
             raise ValueError(
                 "contact ratios must be finite, transverse > 0 and overlap >= 0, "
                 f"not {transverse} and {overlap}"
             )
-        u, v = transverse % 1.0, overlap % 1.0
-        slope_time = min(u, v, 1.0 - u, 1.0 - v)
-        if overlap > 0.0:
-            half_height = slope_time / (2.0 * transverse * overlap)
-        else:
-            # Limit of the line above: the contact jumps by the whole width, unless u is zero.
-            half_height = 1.0 / (2.0 * transverse) if u > 0.0 else 0.0
+        u, v = np.asarray(transverse) % 1.0, np.asarray(overlap) % 1.0
+        slope_time = np.minimum.reduce(np.broadcast_arrays(u, v, 1.0 - u, 1.0 - v))
+        # Limit of the line below for a spur pair: the contact jumps by the whole width, unless u is
+        # zero.
+        jump = np.where(u > 0.0, 1.0 / (2.0 * transverse), 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            height = slope_time / (2.0 * np.asarray(transverse) * overlap)
+        half_height = np.where(np.asarray(overlap) > 0.0, height, jump)
         return cls(slope_time, abs(u - v), slope_time, abs(1.0 - u - v), half_height)
 
     def table(self, points: int) -> Floats:
@@ -90,16 +92,19 @@ class TrapezoidalStiffness:
         return 1.0 + self.half_height * (shape - mean_of_shape)
 
     def coefficients(self, harmonics: int) -> Complex:
-        """Return the exact Fourier coefficients of this shape, as `series_table` takes them.
+        """Return exact Fourier coefficients (..., harmonics), as `series_table` takes them.
 
         The derivative of the shape is one box over the rise and one over the fall, whose
         coefficients are sinc functions; dividing them by 2 pi i n integrates.
         """
         n = np.arange(1, harmonics + 1)
-        middle_of_fall = self.rise + self.top + self.fall / 2.0
-        up = np.exp(-1j * np.pi * n * self.rise) * np.sinc(n * self.rise)
-        down = np.exp(-2j * np.pi * n * middle_of_fall) * np.sinc(n * self.fall)
-        found: Complex = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
+        rise, top, fall, half_height = (
+            np.asarray(part)[..., np.newaxis]
+            for part in (self.rise, self.top, self.fall, self.half_height)
+        )
+        up = np.exp(-1j * np.pi * n * rise) * np.sinc(n * rise)
+        down = np.exp(-2j * np.pi * n * (rise + top + fall / 2.0)) * np.sinc(n * fall)
+        found: Complex = 2.0 * half_height * (up - down) / (1j * np.pi * n)
         return found
 
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness
 from gearchaos.models.gear_pair.geometry import HelicalPair, Value
 from gearchaos.models.phase_series import Series
@@ -48,8 +47,7 @@ def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) ->
     ``physical`` holds every key of the physical tables of a configuration by its path, such as
     ``pair.teeth``, with its value; None is not known, and a number may be an array over lanes,
     which broadcasts. A group whose inputs are not all known is absent, as are those ``without``.
-    Raises ConfigurationError if the stiffness harmonics would differ between lanes, KeyError if the
-    mapping lacks a path.
+    Raises KeyError if the mapping lacks a path.
     """
     return _derive(physical, {name: _DERIVATIONS[name] for name in _DERIVATIONS.keys() - without})
 
@@ -216,19 +214,19 @@ class Quantities:
 
     @cached_property
     def stiffness_harmonics(self) -> tuple[Any, Any]:
-        """Cosine and sine harmonics of the stiffness relative to its mean (Pan 2021, eqs 15-19)."""
+        """Cosine and sine harmonics of the stiffness relative to its mean (Pan 2021, eqs 15-19).
+
+        Each has the shape (harmonics,), or (..., harmonics) if a swept value enters. The shape does
+        not depend on the values, so that every part of a sweep is computed alike.
+        """
         if self["mesh.stiffness.shape"] == "fourier":
-            mean = _common(self["mesh.mean_stiffness_N_per_um_mm"], 0.0)
-            if mean is None:
-                raise ConfigurationError(_ONE_TABLE)
+            mean = np.asarray(self["mesh.mean_stiffness_N_per_um_mm"])[..., np.newaxis]
             cosine = np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean)
             return cosine, np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean)
         if self["mesh.stiffness.shape"] == "table":
             series = self.table
             return np.array(series.cosine) / series.mean, np.array(series.sine) / series.mean
-        ratios = common_contact_ratios(self.pair)
-        if ratios is None:
-            raise ConfigurationError(_ONE_TABLE)
+        ratios = self.pair.transverse_contact_ratio, self.pair.overlap_contact_ratio
         trapezoid = TrapezoidalStiffness.from_contact_ratios(*ratios)
         coefficients = trapezoid.coefficients(self["mesh.stiffness.harmonics"])
         return coefficients.real, -coefficients.imag
@@ -241,14 +239,6 @@ def _in_metres(millimetres: Any) -> Any:
     if isinstance(millimetres, tuple | list):
         return tuple(_MILLIMETRE * one for one in millimetres)
     return _MILLIMETRE * millimetres
-
-
-_ONE_TABLE = (
-    "the harmonics of the mesh stiffness would differ between the swept values, but all "
-    "values of a sweep share one stiffness table, which the compiled equations read at every step: "
-    "give stiffness_cosine and stiffness_sine in [groups], sweep stiffness_variation_scale, or "
-    'describe the pair by model.kind = "train", where every value has its own harmonics'
-)
 
 
 def common_contact_ratios(pair: HelicalPair) -> tuple[float, float] | None:

@@ -23,8 +23,8 @@ class ResolvedGroups:
     """The dimensionless groups of the rows of `GROUP_TABLE`, each also an attribute by its name.
 
     ``values``: every group that is known, a number or an array over lanes; the stiffness harmonics
-    are arrays of shape (harmonics,), common to all lanes. The attribute of a group that is not
-    known is None. ``origin``: whether each was given, derived or taken by default.
+    are arrays of shape (harmonics,) or (..., harmonics) over lanes. The attribute of a group that
+    is not known is None. ``origin``: whether each was given, derived or taken by default.
     """
 
     values: Mapping[str, Value]
@@ -51,8 +51,7 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Res
     the shorter one continues with zeros.
 
     ``physical`` is as `derive_groups` takes it; ``given`` maps names of groups to a number, an
-    array over lanes, or a list of harmonics. Raises ConfigurationError if the stiffness harmonics
-    would differ between lanes, KeyError if a given name is not a group.
+    array over lanes, or a list of harmonics. Raises KeyError if a given name is not a group.
     """
     direct = {GROUPS_BY_NAME[name].name: value for name, value in given.items()}
     without = {*direct, *(() if direct.keys().isdisjoint(HARMONICS) else HARMONICS)}
@@ -67,10 +66,11 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Res
         values |= groups
         origin |= dict.fromkeys(groups, source)
     if not values.keys().isdisjoint(HARMONICS):
-        harmonics = max(len(values.get(name, ())) for name in HARMONICS)
-        for name in HARMONICS:
-            known = values.get(name, ())
-            values[name] = [*known, *[0.0] * (harmonics - len(known))]
+        waves = {name: np.asarray(values.get(name, ()), dtype=np.float64) for name in HARMONICS}
+        harmonics = max(wave.shape[-1] for wave in waves.values())
+        for name, wave in waves.items():
+            missing = np.zeros((*wave.shape[:-1], harmonics - wave.shape[-1]))
+            values[name] = np.concatenate([wave, missing], axis=-1)
             origin.setdefault(name, "default")
     names = [row.name for row in GROUP_TABLE if row.name in values]
     return ResolvedGroups(

@@ -8,7 +8,6 @@ from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.tables import OF_CONTROLLERS, swept_values
-from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.derivation import derive_groups, paths_behind
 from gearchaos.models.gear_pair.group_table import (
     GROUPS_BY_NAME,
@@ -20,6 +19,9 @@ from gearchaos.models.gear_pair.groups import ResolvedGroups
 from gearchaos.models.gear_pair.pitch_errors import OF_DRAWN_GEARS, grade_faults
 from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS, GearPairTables, groups_at
 
+MOST_OWN_HARMONICS = 40
+"""Largest number of harmonics that differ between lanes: each is a term of compiled formulas."""
+
 
 def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     """Yield the faults of the groups of the lanes, if every single table is sound."""
@@ -30,9 +32,6 @@ def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
     try:
         groups = groups_at(config, some)
-    except ConfigurationError as error:
-        yield Fault(" or ".join(config.swept.values()), str(error), "", " or ".join(config.swept))
-        return
     except (ArithmeticError, ValueError) as error:
         remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
         yield Fault("groups", f"cannot be derived from the physical tables ({error})", remedy)
@@ -42,6 +41,7 @@ def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     yield from (_missing(config, row) for row in missing)
     yield from _out_of_range(config, groups)
     yield from _decoupled(config, groups)
+    yield from _too_many_harmonics(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
         drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
         known = sweep.parameter in SWEEPABLE_GROUPS or not missing
@@ -61,7 +61,7 @@ def _moved(config: GearPairTables, groups: ResolvedGroups, axis: int, count: int
     """Whether a sweep, along this axis, changes a group on which what is kept depends."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
-        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.needed_effects):
+        if np.ndim(value) > row.is_list and row.needed_by(config.needed_effects):
             along = np.moveaxis(np.asarray(value), axis, 0)
             if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
                 return True
@@ -70,8 +70,10 @@ def _moved(config: GearPairTables, groups: ResolvedGroups, axis: int, count: int
 
 def _without_effect(config: GearPairTables, table: str, values: Floats) -> Fault:
     parameter, swept = config.sweeps[table].parameter, config.swept
-    derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
-    names = [name for name, value in derived.items() if np.ndim(value) > 0]
+    derived = derive_groups({**config.physical(), parameter: values})
+    names = [
+        name for name, value in derived.items() if np.ndim(value) > GROUPS_BY_NAME[name].is_list
+    ]
     stronger = [name for name in names if name in swept or name in config.groups.given()]
     rows = [GROUPS_BY_NAME[name] for name in names or [parameter] if name in GROUPS_BY_NAME]
     off = [row for row in rows if not row.needed_by(config.scene.effects)]
@@ -119,6 +121,17 @@ def _out_of_range(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fa
             rule = f"derived from {paths}, must be {row.valid.rule}"
             remedy = "check the magnitudes of those keys"
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
+
+
+def _too_many_harmonics(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fault]:
+    waves = groups.values.get(HARMONICS[0], 0.0)
+    if np.ndim(waves) < 2 or np.shape(waves)[-1] <= MOST_OWN_HARMONICS:
+        return
+    key = "harmonics" if config.physical()["mesh.stiffness.harmonics"] else "cosine_N_per_um_mm"
+    swept = " or ".join(config.swept)
+    rule = f"gives more than {MOST_OWN_HARMONICS} harmonics, and {swept} changes them in each lane"
+    remedy = f"keep at most {MOST_OWN_HARMONICS}, or sweep another parameter"
+    yield Fault(f"mesh.stiffness.{key}", rule, remedy, int(np.shape(waves)[-1]))
 
 
 def _decoupled(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fault]:

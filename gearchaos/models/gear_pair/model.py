@@ -83,13 +83,16 @@ class GearPairModel(Model):
         groups |= {name: filled(name) for name in Groups._fields if name not in groups}
         cosine, sine = found.stiffness_cosine, found.stiffness_sine
         cosine, sine = (np.zeros(0) if wave is None else wave for wave in (cosine, sine))
+        if cosine.ndim > 1:
+            harmonics = *lanes, cosine.shape[-1]
+            cosine, sine = (np.broadcast_to(wave, harmonics).copy() for wave in (cosine, sine))
         return GearPairs(
             Effects(**{effect: effect in effects for effect in Effects._fields}),
             Groups(**groups),
             cosine,
             sine,
             physical=config.formulation == "physical",
-            teeth=_teeth(config, values, complex(*cosine[:1], *-sine[:1])),
+            teeth=_teeth(config, values, cosine, sine),
             damped_in_contact_only=config.mesh is not None
             and config.mesh.damping_acts == "in_contact",
         )
@@ -166,7 +169,7 @@ class GearPairModel(Model):
 
 
 def _teeth(
-    config: GearPairConfiguration, values: Mapping[str, Floats], fundamental: complex
+    config: GearPairConfiguration, values: Mapping[str, Floats], cosine: Floats, sine: Floats
 ) -> Teeth | None:
     """Return the errors of the teeth of some lanes, None where they have none of their own."""
     error = config.pitch_error
@@ -179,5 +182,8 @@ def _teeth(
             f"{config.source}: the contact ratio of [pair] would differ between the swept values, "
             "but all of them share one table of contact lines; sweep another parameter"
         )
+    # Equal contact ratios give all lanes the same phase of the stiffness.
+    first = cosine.reshape(-1, cosine.shape[-1])[0], sine.reshape(-1, sine.shape[-1])[0]
+    fundamental = complex(*first[0][:1], *-first[1][:1])
     shares = line_shares(*ratios, error.smoothing, fundamental)
     return Teeth(*tooth_deviations(error, config.pair, values), *shares)

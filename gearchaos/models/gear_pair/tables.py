@@ -190,14 +190,13 @@ def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> Re
     ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group
     replaces the one in the file; a physical quantity takes part in the derivation of every group
     that is not given; no group depends on the number of a drawn gear pair. Each group comes in the
-    broadcast shape of the values on which it depends, as a float where on none. Raises
-    ConfigurationError if the harmonics of the mesh stiffness would differ between lanes, KeyError
-    if a parameter cannot be swept.
+    broadcast shape of the values on which it depends, as a float where on none; harmonics have one
+    more axis. Raises KeyError if a parameter cannot be swept.
     """
     physical = physical_at(config, values)
     given: dict[str, Any] = dict(config.groups.given())
     if "stiffness_variation" not in config.scene.effects:
-        # Lanes share one table of harmonics; a scene without it may sweep what they depend on.
+        # Unused, so that a sweep of what they depend on need not compile formulas for them.
         physical["mesh.stiffness.shape"] = None
     for parameter, value in values.items():
         if parameter in SWEEPABLE_GROUPS:

@@ -199,7 +199,7 @@ def write_metadata(file: h5py.File, metadata: Metadata) -> None:
 
 
 def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
-    rows = (np.size(p.values) for p in parameters.values() if p.dims == (HARMONIC,))
+    rows = (np.shape(p.values)[-1] for p in parameters.values() if p.dims[-1:] == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
     return GENERIC.variables((), {HARMONICS_PART: numbers.size > 0}, Details({HARMONIC: numbers}))
 

@@ -154,7 +154,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
         notes, name = stored.scalars_of(dataset), path.removeprefix(f"{PARAMETER_GROUP}/")
         dims = stored.dims_of(path, dataset, notes, sizes)
         origin = str(notes.get("origin"))
-        of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
+        of_the_model = dims == tuple(a for a in (*axes, HARMONIC) if a in dims)
         if dataset.dtype.str[1:] != "f8" or not of_the_model or origin not in ORIGINS:
             raise UnfitError(f"holds a parameter {name} that is none")
         values = stored.values_of(name, dataset)

@@ -8,12 +8,14 @@ Taylor series about the nearest row is as accurate as the table itself.
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.memory.block_memory import read_lane
+from gearchaos_kernels.models.gear_pair.coefficients import Lane
 from gearchaos_kernels.models.mesh_phase import (
     half_step_angles,
     harmonic_series,
@@ -21,6 +23,8 @@ from gearchaos_kernels.models.mesh_phase import (
     sine_and_cosine,
     turned,
 )
+from gearchaos_kernels.models.sums import sums
+from gearchaos_kernels.models.waves import waves_in_row, waves_within
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
@@ -86,17 +90,57 @@ def phase_table(
 
 
 def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
-    """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
+    """Return Taylor coefficients about the middle of every step, shape (3 + waves, terms, steps).
 
     They are those of the stiffness variation relative to the mean (eq. 19), then of sine and cosine
-    of the mesh phase.
+    of the mesh phase. If lanes have harmonics of their own, the variation is 0, and cosine and sine
+    of each harmonic follow.
     """
     variation = np.zeros((terms, steps))
-    if system.effects.stiffness_variation:
-        for order, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
-            variation += harmonic_series(order, steps, terms, amplitude).real
     wave = harmonic_series(1, steps, terms)
-    return np.stack([variation, wave.imag, wave.real])
+    series = [variation, wave.imag, wave.real]
+    for order in range(1, system.harmonics() + 1):
+        if system.own_harmonics:
+            wave = harmonic_series(order, steps, terms)
+            series += [wave.real, wave.imag]
+        else:
+            cosine, sine = system.stiffness_cosine[order - 1], system.stiffness_sine[order - 1]
+            variation += harmonic_series(order, steps, terms, cosine - 1j * sine).real
+    return np.stack(series)
+
+
+def _own_terms(flags: Any) -> list[list[tuple[int | None, int]]]:
+    """Return the products of a lane's harmonics with the waves, whose sum is the variation."""
+    first = len(Lane._fields)
+    return [[(first + wave, wave) for wave in range(2 * len(flags.orders))]]
+
+
+_own_variation = sums(_own_terms)
+
+
+@scalar
+def waves_at(table, row, scene):
+    """Return the waves at a row of their table, None if lanes share their harmonics."""
+    if scene.model.own is None:
+        return None
+    return waves_in_row(table, row, scene)
+
+
+@scalar
+def waves_between(table, number, fraction, scene):
+    """Return the waves at a fraction of a step, None if lanes share their harmonics."""
+    if scene.model.own is None:
+        return None
+    return waves_within(table, number, fraction, scene)
+
+
+@scalar
+def of_lane(memory, slot, point, waves, scene):
+    """Return a mesh phase with the stiffness variation of a lane, by its own harmonics."""
+    if scene.model.own is None:
+        return point
+    (variation,) = _own_variation(read_lane(memory, slot, scene), scene, waves)
+    return Phase(variation, point.value, point.slope, point.curvature)
 
 
 @scalar

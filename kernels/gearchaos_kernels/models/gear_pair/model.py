@@ -1,6 +1,8 @@
 """The gear pair as a model: its flags and its entries in the model protocol."""
 
-from dataclasses import dataclass
+from collections import namedtuple
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,21 @@ from gearchaos_kernels.models.gear_pair import equations, forcing, teeth
 from gearchaos_kernels.models.gear_pair.coefficients import Lane
 from gearchaos_kernels.models.gear_pair.forcing import Forcing, Phase, forcing_at
 from gearchaos_kernels.models.protocol import ElementKind, MapFormulas, Model
-from gearchaos_kernels.scene import implement
+from gearchaos_kernels.plan import Floats
+from gearchaos_kernels.scene import flag, implement
+
+
+@dataclass(frozen=True)
+class OwnHarmonics:
+    """Harmonics of the mesh stiffness that differ between lanes.
+
+    Attributes
+    ----------
+    count : int
+        Number of harmonics.
+    """
+
+    count: int
 
 
 @dataclass(frozen=True)
@@ -22,6 +38,8 @@ class GearPair:
     ----------
     damped_in_contact : True or None
         The damper of the mesh acts only while teeth are in contact.
+    harmonics : OwnHarmonics or None
+        Harmonics of the mesh stiffness that differ between lanes; None if lanes share them.
     pitch_error, stiffness_variation, transverse, axial, friction : True or None
         The effects of these names; see `Effects`.
     phase : True or None
@@ -44,6 +62,17 @@ class GearPair:
     axial: Any
     friction: Any
     damped_in_contact: Any = None
+    harmonics: OwnHarmonics | None = None
+
+    @property
+    def own(self) -> bool | None:
+        """Whether each lane has harmonics of its own, as a flag."""
+        return flag(self.harmonics)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of the harmonics that each lane has of its own."""
+        return tuple(range(1, self.harmonics.count + 1)) if self.harmonics else ()
 
 
 def _coordinates_of(flags: GearPair) -> tuple[bool, ...]:
@@ -67,7 +96,8 @@ def _inputs(flags: GearPair) -> NDArray[Any]:
 
     See `MapFormulas.inputs`. A scene without pitch error, or without its phase, has fewer inputs.
     """
-    inputs = np.zeros((3, 3, 3))
+    functions = 3 + 2 * len(flags.orders)
+    inputs = np.zeros((3, functions, functions))
     inputs[0, 0, 0] = 1.0
     # The first part is sin(phase), with the derivative cos(phase). The second part is a quarter of
     # a turn ahead: cos(phase), with the derivative -sin(phase).
@@ -100,14 +130,13 @@ def _gap_coefficients(flags: GearPair) -> tuple[str, ...]:
 
 @scalar
 def _point_of_waves(waves, scene):
-    """Return the mesh phase with this sine and cosine."""
-    sine, cosine = waves
-    return Phase(0.0, sine, cosine, -sine)
+    """Return the mesh phase with this sine and cosine, the first two of the waves."""
+    return Phase(0.0, waves[0], waves[1], -waves[0])
 
 
 @scalar
 def _unit_forcing(lane, drive, waves, scene):
-    """Return the forcing of a lane of unit inputs by a drive, and by this sine and cosine."""
+    """Return the forcing of a lane of unit inputs by a drive, and by these values of the waves."""
     acting = forcing_at(lane, _point_of_waves(waves, scene), scene)
     return Forcing(
         acting.stiffness,
@@ -194,4 +223,30 @@ MODEL = Model(
     maps=MAPS,
 )
 
-implement(GearPair, MODEL)
+
+def _own_stiffness(flags: GearPair, coefficients: Floats) -> Floats:
+    """Return the stiffness of both directions as parts of the waves; see `Model.stiffness`."""
+    first, waves = len(Lane._fields), 2 * len(flags.orders)
+    columns = [Lane._fields.index(name) for name in MAPS.stiffness]
+    mean, variation = coefficients[:, columns].T
+    own = variation[:, np.newaxis] * coefficients[:, first : first + waves]
+    # The variation that lanes share, and sine and cosine, which force the pair, are left out.
+    nothing = np.zeros((len(mean), 3))
+    parts = np.concatenate([mean[:, np.newaxis], nothing, own], axis=1)
+    return np.repeat(parts[:, np.newaxis], _elements(flags), axis=1)
+
+
+@cache
+def model_of(flags: GearPair) -> Model:
+    """Return the model of gear pairs: lanes with harmonics of their own have more coefficients."""
+    if flags.harmonics is None:
+        return MODEL
+    names = [f"{kind}_{order}" for order in flags.orders for kind in ("cosine", "sine")]
+    return replace(
+        MODEL,
+        lane=namedtuple("Lane", [*Lane._fields, *names]),
+        maps=replace(MAPS, waves=(*MAPS.waves, *names), stiffness_parts=_own_stiffness),
+    )
+
+
+implement(GearPair, model_of)

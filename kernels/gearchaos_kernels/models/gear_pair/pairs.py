@@ -14,10 +14,12 @@ from gearchaos_kernels.models.gear_pair.coefficients import (
 )
 from gearchaos_kernels.models.gear_pair.forcing import wave_series
 from gearchaos_kernels.models.gear_pair.groups import Effects, Groups
-from gearchaos_kernels.models.gear_pair.model import GearPair
+from gearchaos_kernels.models.gear_pair.model import GearPair, OwnHarmonics
 from gearchaos_kernels.models.gear_pair.teeth import NARROW, ToothTables, tables_of
 from gearchaos_kernels.models.gear_pair.tooth_errors import Teeth
 from gearchaos_kernels.models.lane_system import LaneSystem
+from gearchaos_kernels.models.mesh_phase import sine_and_cosine
+from gearchaos_kernels.models.waves import waves_of
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import flag
 
@@ -50,8 +52,9 @@ class GearPairs(LaneSystem):
         Which effects act, the same for all lanes.
     groups : Groups
         Dimensionless groups of eqs 8-13, each an array of shape (lanes,).
-    stiffness_cosine, stiffness_sine : array, shape (harmonics,)
-        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
+    stiffness_cosine, stiffness_sine : array, shape (harmonics,) or (lanes, harmonics)
+        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19), which all lanes
+        share, or those of each lane.
     control : Control or None
         The controllers of the pairs, see `LaneSystem.controlled`.
     physical : bool
@@ -107,6 +110,11 @@ class GearPairs(LaneSystem):
         return math.lcm(self.teeth.driving.shape[1], self.teeth.driven.shape[1])
 
     @property
+    def own_harmonics(self) -> bool:
+        """Whether each lane has harmonics of the mesh stiffness of its own."""
+        return self.effects.stiffness_variation and self.stiffness_cosine.ndim > 1
+
+    @property
     def clearance(self) -> bool:
         """Whether the teeth have backlash."""
         return self.effects.backlash
@@ -127,11 +135,20 @@ class GearPairs(LaneSystem):
             axial=flag(effects.axial),
             friction=flag(effects.friction),
             damped_in_contact=flag(self.damped_in_contact_only),
+            harmonics=OwnHarmonics(self.harmonics()) if self.own_harmonics else None,
         )
 
     def coefficients(self, step: Floats) -> Floats:
         """Return the coefficients of every lane for steps of these lengths; see `Lane`."""
-        return lane_coefficients(self, step)
+        coefficients = lane_coefficients(self, step)
+        return np.concatenate([coefficients, self._own_waves()], axis=1)
+
+    def _own_waves(self) -> Floats:
+        """Return cosine and sine of the harmonics that each lane has of its own, in turn."""
+        if not self.own_harmonics:
+            return np.zeros((self.lanes, 0))
+        waves = np.stack([self.stiffness_cosine, self.stiffness_sine], axis=2)
+        return waves.reshape(self.lanes, -1)
 
     def scales(self, step: Floats) -> Floats:
         """Return the factors from scaled states to those of eq. 13, shape (lanes, states)."""
@@ -168,10 +185,12 @@ class GearPairs(LaneSystem):
             values = 2 * values
         if self.effects.stiffness_variation:
             waves = self.stiffness_cosine + 1j * self.stiffness_sine
-            harmonics = np.concatenate([[0.0], waves])
-            variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
+            harmonics = np.concatenate([np.zeros((*waves.shape[:-1], 1)), waves], axis=-1)
+            points = _POINTS_PER_WAVE * harmonics.shape[-1]
+            variation = np.fft.fft(harmonics, points).real
             scale = self.groups.stiffness_variation_scale
-            values = [1.0 + scale * extreme for extreme in (np.min(variation), np.max(variation))]
+            extremes = np.min(variation, axis=-1), np.max(variation, axis=-1)
+            values = [1.0 + scale * extreme for extreme in extremes]
         if self.effects.friction:
             share = self.groups.friction_coefficient * self.groups.friction_lever
             values = [values[0] * (1.0 - share), values[1] * (1.0 + share)]
@@ -212,29 +231,32 @@ class GearPairs(LaneSystem):
 
     def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        return np.array([getattr(self.groups, name) for name in _MAP_GROUPS]).T.copy()
+        groups = np.array([getattr(self.groups, name) for name in _MAP_GROUPS]).T
+        return np.concatenate([groups, self._own_waves()], axis=1)
 
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
-        damping = self.damped_in_contact_only
-        return (
-            self.physical,
-            damping,
-            self.stiffness_cosine.tobytes(),
-            self.stiffness_sine.tobytes(),
-        )
+        constants = self.physical, self.damped_in_contact_only
+        if self.own_harmonics:
+            return constants
+        return *constants, self.stiffness_cosine.tobytes(), self.stiffness_sine.tobytes()
 
     def harmonics(self) -> int:
         """Return the highest harmonic of the mesh frequency in the coefficients."""
-        return self.stiffness_cosine.size if self.effects.stiffness_variation else 0
+        return self.stiffness_cosine.shape[-1] if self.effects.stiffness_variation else 0
 
     def wave_series(self, steps: int, terms: int) -> Floats:
-        """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
+        """Return Taylor coefficients about the middle of every step, (3 + waves, terms, steps).
 
-        They are those of the stiffness variation relative to the mean (eq. 19), of the sine and of
-        the cosine of the mesh phase.
+        They are those of the stiffness variation relative to the mean (eq. 19), of sine and cosine
+        of the mesh phase, and of the waves of harmonics that each lane has of its own.
         """
         return wave_series(self, steps, terms)
+
+    def wave_values(self, phase: Floats) -> Floats:
+        """Return the waves at mesh phases in rad, shape (phases, waves): see `wave_series`."""
+        own = waves_of(self.flags().orders, phase)
+        return np.concatenate([sine_and_cosine(phase), own], axis=1)
 
     def refuses_maps(self) -> str:
         """Return why flow maps cannot integrate the system, or an empty text."""
@@ -249,7 +271,11 @@ class GearPairs(LaneSystem):
         teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[chosen])
         groups = Groups(*(group[chosen] for group in self.groups))
         control = self.control and self.control.of(chosen)
-        return self.replace(groups=groups, teeth=teeth, control=control)
+        changes = {}
+        if self.stiffness_cosine.ndim > 1:
+            for name in ("stiffness_cosine", "stiffness_sine"):
+                changes[name] = getattr(self, name)[chosen]
+        return self.replace(groups=groups, teeth=teeth, control=control, **changes)
 
 
 class MeshMotion(NamedTuple):

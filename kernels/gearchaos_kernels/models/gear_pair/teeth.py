@@ -21,11 +21,16 @@ from gearchaos_kernels.memory.block_memory import load, store
 from gearchaos_kernels.memory.rows import STRIDE, rows
 from gearchaos_kernels.models.gear_pair.forcing import (
     Phase,
+    of_lane,
     phase_on_grid,
     phase_table,
     phase_within,
+    waves_at,
+    waves_between,
 )
 from gearchaos_kernels.models.gear_pair.tooth_errors import SPLINE_DEGREE, Teeth
+from gearchaos_kernels.models.mesh_phase import half_step_angles
+from gearchaos_kernels.models.waves import waves_of
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
@@ -48,6 +53,8 @@ class ToothTables(NamedTuple):
     ----------
     phases : array, shape (2 steps + 1, columns)
         See `phase_table`.
+    waves : array, shape (2 steps + 1, waves)
+        See `waves_of`; no waves if lanes share the harmonics of their stiffness.
     shares : array, shape (2 steps + 1, 3, pairs - 1)
         See `share_table`.
     driving, driven, profile : arrays
@@ -57,6 +64,7 @@ class ToothTables(NamedTuple):
     """
 
     phases: Floats
+    waves: Floats
     shares: Floats
     driving: Floats
     driven: Floats
@@ -66,12 +74,13 @@ class ToothTables(NamedTuple):
 
 def tables_of(system: "GearPairs", steps_per_period: int) -> ToothTables:
     """Return the tables of a system; raise ValueError with too many tooth pairs in mesh."""
-    waves = tuple(system.stiffness_cosine), tuple(system.stiffness_sine)
-    phases = phase_table(*waves, steps_per_period)
+    shared = () if system.own_harmonics else (system.stiffness_cosine, system.stiffness_sine)
+    phases = phase_table(*(tuple(one) for one in shared or ((), ())), steps_per_period)
     teeth = system.teeth if system.effects.pitch_error and system.teeth is not None else NO_TEETH
     ahead = 0 if teeth is NO_TEETH else teeth.ahead
     return ToothTables(
         phases,
+        waves_of(system.flags().orders, half_step_angles(steps_per_period)),
         share_table(teeth, steps_per_period),
         np.ascontiguousarray(teeth.driving, dtype=np.float64),
         np.ascontiguousarray(teeth.driven, dtype=np.float64),
@@ -170,19 +179,22 @@ def three(shares, first):
 @scalar
 def grid_at(tables, row, scene):
     """Return the mesh phase and the shares of the tooth pairs at a row of the tables."""
-    return phase_on_grid(tables.phases, row), shares_at(tables.shares, row, scene)
+    shares = shares_at(tables.shares, row, scene)
+    return phase_on_grid(tables.phases, row), shares, waves_at(tables.waves, row, scene)
 
 
 @scalar
 def grid_within(tables, number, fraction, scene):
     """Return the mesh phase at a fraction of a step, for scenes without errors tooth by tooth."""
-    return phase_within(tables.phases, number, fraction), None
+    waves = waves_between(tables.waves, number, fraction, scene)
+    return phase_within(tables.phases, number, fraction), None, waves
 
 
 @scalar
 def point_at(memory, slot, grid, scene):
     """Return the mesh phase of a lane: with teeth, its error is the weighted sum over the pairs."""
-    point, shares = grid
+    point, shares, waves = grid
+    point = of_lane(memory, slot, point, waves, scene)
     if scene.model.teeth is None:
         return point
     near, far = shares
@@ -200,8 +212,7 @@ def point_at(memory, slot, grid, scene):
 def first_point(memory, slot, grid, scene):
     """Return the mesh phase at the beginning of a step; with teeth, the one that was kept."""
     if scene.model.teeth is None:
-        point, _ = grid
-        return point
+        return point_at(memory, slot, grid, scene)
     return load(memory, rows(scene).model + MOST_PAIRS, slot, Phase)
 
 
@@ -215,7 +226,8 @@ def keep_point(memory, slot, point, scene):
 @scalar
 def point_within(memory, slot, tables, number, fraction, scene):
     """Return the mesh phase of a lane at a fraction of a step."""
-    point = phase_within(tables.phases, number, fraction)
+    waves = waves_between(tables.waves, number, fraction, scene)
+    point = of_lane(memory, slot, phase_within(tables.phases, number, fraction), waves, scene)
     if scene.model.teeth is not None:
         half = 0 if fraction < 0.5 else 1
         row = 2 * number + half

@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.models.linear.structure import Structure, numbered, places_of
-from gearchaos_kernels.models.linear.sums import Terms, sums
-from gearchaos_kernels.models.mesh_phase import nearest_row, turned
 from gearchaos_kernels.models.protocol import Element, ElementKind, Gap, MapFormulas, Model
+from gearchaos_kernels.models.sums import Terms, sums
+from gearchaos_kernels.models.waves import waves_in_row, waves_within
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import implement
 
@@ -32,6 +31,11 @@ class Linear:
     """
 
     structure: Structure
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of the harmonics whose cosine and sine are waves."""
+        return self.structure.orders
 
 
 class Forcing(NamedTuple):
@@ -77,8 +81,9 @@ def _rows(
     return terms
 
 
-def _acceleration_terms(structure: Structure) -> Terms:
+def _acceleration_terms(flags: Linear) -> Terms:
     """Return the terms of the accelerations: forces, positions, rates, and pushes of elements."""
+    structure = flags.structure
     count = structure.coordinates
     products = _rows(
         structure,
@@ -93,11 +98,17 @@ def _acceleration_terms(structure: Structure) -> Terms:
 
 def _of_waves(name: str, rows: str) -> Any:
     """Return sums over the waves, the constant 1 first, for all coordinates or elements."""
-    return sums(lambda given: _rows(given, (name,), getattr(given, rows), (1 + given.waves,)))
+
+    def terms(flags: Linear) -> Terms:
+        given = flags.structure
+        return _rows(given, (name,), getattr(given, rows), (1 + given.waves,))
+
+    return sums(terms)
 
 
-def _of_coordinates(structure: Structure) -> Terms:
+def _of_coordinates(flags: Linear) -> Terms:
     """Return the terms of the gaps."""
+    structure = flags.structure
     return _rows(structure, ("gap",), structure.elements, (structure.coordinates,))
 
 
@@ -106,7 +117,7 @@ _stiffnesses = _of_waves("stiffness", "elements")
 _motions = _of_waves("motion", "elements")
 _motion_rates = _of_waves("motion_rate", "elements")
 _gap_sums = sums(_of_coordinates)
-_accelerations = sums(_acceleration_terms, coordinates_of)
+_accelerations = sums(_acceleration_terms, lambda flags: coordinates_of(flags.structure))
 
 
 def _picked(name: str) -> Any:
@@ -151,91 +162,16 @@ def _speed_of(_typing_context: Any, lane: Any, scene: Any) -> Any:
     return types.float64(lane, scene), generate
 
 
-@intrinsic
-def _waves_in_row(_typing_context: Any, table: Any, row: Any, scene: Any) -> Any:
-    """Return a row of a table as a tuple."""
-    count = scene.scene.model.structure.waves
-    returned = types.UniTuple(types.float64, count)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        integer = ir.IntType(types.intp.bitwidth)
-        first = builder.mul(arguments[1], integer(count))
-        found = [
-            builder.load(builder.gep(array.data, [builder.add(first, integer(number))]))
-            for number in range(count)
-        ]
-        return context.make_tuple(builder, returned, found)
-
-    return returned(table, types.intp, scene), generate
-
-
-@intrinsic
-def _paired(_typing_context: Any, values: Any) -> Any:
-    """Return the cosines and the sines among the values of the waves, two tuples."""
-    half = types.UniTuple(types.float64, len(values) // 2)
-    returned = types.UniTuple(half, 2)
-
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        numbers = [builder.extract_value(arguments[0], at) for at in range(len(values))]
-        halves = [context.make_tuple(builder, half, numbers[at::2]) for at in range(2)]
-        return context.make_tuple(builder, returned, halves)
-
-    return returned(values), generate
-
-
-@intrinsic
-def _harmonics(_typing_context: Any, scene: Any) -> Any:
-    """Return the harmonics of the waves, a tuple of constants."""
-    numbers = scene.scene.model.structure.orders
-    returned = types.UniTuple(types.float64, len(numbers))
-
-    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        found = [ir.Constant(ir.DoubleType(), float(number)) for number in numbers]
-        return context.make_tuple(builder, returned, found)
-
-    return returned(scene), generate
-
-
-@intrinsic
-def _interleaved(_typing_context: Any, pairs: Any) -> Any:
-    """Return the numbers of a tuple of (sine, cosine) as cosine, sine, cosine, sine, ..."""
-    returned = types.UniTuple(types.float64, 2 * len(pairs))
-
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        numbers = []
-        for at in range(len(pairs)):
-            pair = builder.extract_value(arguments[0], at)
-            numbers += [builder.extract_value(pair, 1), builder.extract_value(pair, 0)]
-        return context.make_tuple(builder, returned, numbers)
-
-    return returned(pairs), generate
-
-
 @scalar
 def grid_at(table, row, scene):
     """Return the waves at a row of the grid of half steps, a tuple."""
-    return _waves_in_row(table, row, scene)
-
-
-@scalar
-def grid_within(table, number, fraction, scene):
-    """Return the waves at a fraction of a step, from the nearest row of the grid."""
-    row, angle = nearest_row(number, fraction, table.shape[0])
-    cosines, sines = _paired(_waves_in_row(table, row, scene))
-    return _interleaved(each(_turned_harmonic, sines, cosines, _harmonics(scene), angle))
-
-
-@scalar
-def _turned_harmonic(sine, cosine, harmonic, angle):
-    """Return sine and cosine of a harmonic of a phase that is an angle further on."""
-    return turned(sine, cosine, harmonic * angle)
+    return waves_in_row(table, row, scene)
 
 
 @scalar
 def point_within(memory, slot, table, number, fraction, scene):
     """Return the waves at a fraction of a step, the same for all lanes."""
-    return grid_within(table, number, fraction, scene)
+    return waves_within(table, number, fraction, scene)
 
 
 @scalar
@@ -401,7 +337,7 @@ def model_of(flags: Linear) -> Model:
         kinds=_kinds,
         observed=tuple(f"gap_{number}" for number in range(structure.elements)),
         grid_at=grid_at,
-        grid_within=grid_within,
+        grid_within=waves_within,
         point_within=point_within,
         forcing_at=forcing_at,
         unforced=unforced,

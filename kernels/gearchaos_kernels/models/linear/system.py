@@ -16,6 +16,7 @@ from gearchaos_kernels.models.linear.structure import (
     structure_of,
 )
 from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
+from gearchaos_kernels.models.waves import waves_of
 from gearchaos_kernels.plan import Floats
 
 MOST_MAPPED = 52
@@ -185,10 +186,7 @@ class LinearSystems(LaneSystem):
 
     def tables(self, steps_per_period: int) -> Floats:
         """Return cosine and sine of every harmonic, shape (2 steps + 1, 2 harmonics)."""
-        angles = half_step_angles(steps_per_period)
-        turns = np.outer(angles, self.orders)
-        waves = np.stack([np.cos(turns), np.sin(turns)], axis=2)
-        return np.ascontiguousarray(waves.reshape(len(angles), 2 * len(self.orders)))
+        return waves_of(self.orders, half_step_angles(steps_per_period))
 
     def refuses_maps(self) -> str:
         """Return why flow maps cannot integrate the systems, or an empty text."""
@@ -240,9 +238,7 @@ class LinearSystems(LaneSystem):
 
     def wave_values(self, phase: Floats) -> Floats:
         """Return the waves at mesh phases in rad, shape (phases, waves)."""
-        turns = np.outer(phase, self.orders)
-        values: Floats = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(phase.size, -1)
-        return values
+        return waves_of(self.orders, phase)
 
     def _parameters(self) -> list[str]:
         """Return the names of the fields that are arrays over the lanes."""

@@ -8,7 +8,6 @@ from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH
-from gearchaos_kernels.models.linear.structure import Structure
 
 _FLAGS = tuple(sorted(FASTMATH))
 _DOUBLE = ir.DoubleType()
@@ -29,24 +28,22 @@ def _flat(builder: Any, kind: Any, value: Any) -> list[Any]:
     ]
 
 
-def sums(
-    terms: Callable[[Structure], Terms], record: Callable[[Structure], Any] | None = None
-) -> Any:
+def sums(terms: Callable[[Any], Terms], record: Callable[[Any], Any] | None = None) -> Any:
     """Return an intrinsic that computes sums of products.
 
-    ``terms(structure)``: the sums. The arguments of the intrinsic are the lane, the scene, and
-    numbers or tuples, whose numbers are counted through. It returns a tuple of the sums, or the
-    named tuple ``record(structure)``.
+    ``terms(flags)``: the sums for these flags of the model. The arguments of the intrinsic are the
+    lane, the scene, and numbers or tuples, whose numbers are counted through. It returns a tuple of
+    the sums, or the named tuple ``record(flags)``.
     """
 
     @intrinsic
     def summed(_typing_context: Any, lane: Any, scene: Any, *given: Any) -> Any:
-        structure = scene.scene.model.structure
-        wanted = terms(structure)
+        flags = scene.scene.model
+        wanted = terms(flags)
         if record is None:
             returned = types.UniTuple(types.float64, len(wanted))
         else:
-            returned = types.NamedUniTuple(types.float64, len(wanted), record(structure))
+            returned = types.NamedUniTuple(types.float64, len(wanted), record(flags))
 
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             numbers = _flat(builder, types.Tuple(given), arguments[2])
