@@ -1,5 +1,6 @@
 """A batch of piecewise-linear systems: their matrices, and what the engine derives from them."""
 
+import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -262,11 +263,16 @@ class LinearSystems(LaneSystem):
 
     def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        without = {"half_clearance", "actuated", *(() if self.structure.actuator else ("actuator",))}
+        without = {
+            "half_clearance",
+            "actuated",
+            *(() if self.structure.actuator else ("actuator",)),
+        }
         names = [name for name in self._parameters() if name not in without]
-        return np.concatenate(
-            [getattr(self, name).reshape(self.lanes, -1) for name in names], axis=1
-        )
+        numbers = [getattr(self, name) for name in names]
+        # A size of -1 is unknown where there are no lanes.
+        flat = [one.reshape(self.lanes, math.prod(one.shape[1:])) for one in numbers]
+        return np.concatenate(flat, axis=1)
 
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
