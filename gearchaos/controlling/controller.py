@@ -47,6 +47,8 @@ class Controller:
     ----------
     actuator : str
         Name of the input.
+    equations : LaneSystem
+        The equations of motion with this input as their steady one.
     gain : array, shape (mesh periods, states)
         Gains K of u = -K (x - r), one for each mesh period of the orbit.
     multipliers, closed_multipliers : array of complex, shape (states,)
@@ -82,20 +84,20 @@ class Controller:
         self.system, self.orbit = system, orbit
         self.settings = _checked(settings or ControlSettings(), system)
         self.actuator = system.config.actuator_of(self.settings.actuator)
-        self._equations = system.actuated(self.actuator)
+        self.equations = system.actuated(self.actuator)
         self._limit = self._largest_input()
-        target = Target.at(self._equations, orbit.point, orbit.period, system.plan)
+        target = Target.at(self.equations, orbit.point, orbit.period, system.plan)
         self.maps, self.scales = target.maps, target.scales
         require_controllable(self.maps, system.config.source)
         self.multipliers, self.shares = controllability(self.maps)
         self.gain = target.gain(self.settings)
-        self._control = control_of([Designed(target, self.gain, self.settings)], self._equations)
+        self._control = control_of([Designed(target, self.gain, self.settings)], self.equations)
         self.closed_multipliers: Complex = sorted_multipliers(self.maps.closed(self.gain))
 
     @property
     def load(self) -> float:
         """The input without control, in the units of the equations, such as the load."""
-        return float(self._equations.steady_input[0])
+        return float(self.equations.steady_input[0])
 
     @property
     def unit(self) -> tuple[float, str]:
@@ -238,7 +240,7 @@ class Controller:
         (2, 10)
         """
         lanes = len(states)
-        system = self._equations.of(np.zeros(lanes, dtype=np.intp))
+        system = self.equations.of(np.zeros(lanes, dtype=np.intp))
         return kernels.integrate(system.controlled(self.control(lanes)), states, plan)
 
 

@@ -121,7 +121,7 @@ def _measures(controller: Controller, states: Floats, *, controlled: bool) -> di
         loads=True,
         contact=controller.system.equations.clearance,
     )
-    system = controller.system.equations.of(np.zeros(len(states), dtype=np.intp))
+    system = controller.equations.of(np.zeros(len(states), dtype=np.intp))
     control = controller.control(len(states)) if controlled else None
     outcome = kernels.integrate(system.controlled(control), states, plan)
     found: dict[str, Any] = dict(run.lanes.model.loads(outcome.loads, system))
