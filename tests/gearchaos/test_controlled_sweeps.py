@@ -269,7 +269,6 @@ def test_a_stopped_sweep_continues_with_the_same_bits(number, tmp_path):
     assert names_in(tmp_path) == ["pair.h5.blocks", "pair.toml"]
     done = run_module("gearchaos.sweep", *words, "--resume", cwd=tmp_path)
     assert done.code == 0, done.err
-    assert "resum" in done.err
     assert run_module("gearchaos.sweep", *words, "-o", "one.h5", cwd=tmp_path).code == 0
     one, resumed = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "pair.h5"))
     assert same_data(one, resumed)
