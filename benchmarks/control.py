@@ -22,8 +22,8 @@ from gearchaos import load_config
 from gearchaos.engine.lanes import Lanes
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
-LANES = 256
-PERIODS = {"rk4": 30, "flow_map": 120}
+LANES = 512
+PERIODS = {"rk4": 60, "flow_map": 240}
 STEPS = {"rk4": 200, "flow_map": 12}
 GAIN = 1e-12
 
