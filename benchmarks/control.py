@@ -4,7 +4,8 @@
 
 The pair of Pan 2021 in chaos is integrated without and with a controller, in turns. The gain is so
 small that the motion crosses as many boundaries in both. Times are processor times of one thread;
-ratios are medians over the rounds.
+ratios are medians over the rounds. Those of RK4 vary by 15 % from process to process: run the
+script several times.
 """
 
 import argparse
