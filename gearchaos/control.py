@@ -1,4 +1,4 @@
-"""Keep a gear pair on a periodic orbit by small changes of its load, once per mesh period.
+"""Keep a machine on a periodic orbit by small changes of an input, once per mesh period.
 
 A periodic orbit of the motion is found, usually an unstable one within chaos. A linear controller
 is designed from the linearised map over a mesh period, and tried from many states of the motion
@@ -6,7 +6,8 @@ without control. The command prints the multipliers with and without control, th
 starts that it captures with its 95 % interval, the time and effort this takes, and contact, loads
 and transmission error before and after.
 
-The controller knows all states, or measures those of --measure and estimates the others. The load
+The controller knows all states, or measures those of --measure and estimates the others. The input
+is the load of a gear pair, a force of a linear machine, or the torque on a shaft of a train. It
 changes only where less than --limit is needed, and is constant over a mesh period.
 
 The table goes to stdout, everything else to stderr. With --output, a figure is drawn as well.
@@ -25,7 +26,6 @@ from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.controlling.controller import Controller
-    from gearchaos.system import System
 
 
 class ControlOptions(NamedTuple):
@@ -45,8 +45,15 @@ class ControlOptions(NamedTuple):
         Option("linear-quadratic gain (default), pole placement, or delayed feedback"),
     ] = "lqr"
     limit: Annotated[
-        float, Option("largest change of the load, as a share of it (default: 0.1)", "SHARE")
+        float, Option("largest change of the input, as a share of it (default: 0.1)", "SHARE")
     ] = 0.1
+    limit_absolute: Annotated[
+        float | None,
+        Option("largest change of the input in its unit: N m, or that of the forces", "VALUE"),
+    ] = None
+    actuator: Annotated[
+        str | None, Option("the input: a force or a shaft (default: the only one)", "NAME")
+    ] = None
     input_weight: Annotated[float, Option("weight of the input in the cost (default: 10)", "R")] = (
         10.0
     )
@@ -101,7 +108,7 @@ def _control(options: ControlOptions) -> None:
         } | {"input_shares": facts["input_shares"].tolist()}
         print(json.dumps(json_values(written), indent=1))
     else:
-        print("\n".join(table(controller.system, facts)))
+        print("\n".join(table(facts)))
     if options.output:
         save_figure(control_page(trial.drawing()), options.output)
 
@@ -130,6 +137,8 @@ def _controller(options: ControlOptions) -> "Controller":
         measured=options.measure,
         noise=options.noise,
         seed=options.seed,
+        actuator=options.actuator,
+        limit_absolute=options.limit_absolute,
     )
     return Controller(system, orbits[options.orbit], settings)
 
@@ -148,10 +157,12 @@ MEASURES = {
     "load_factor_largest": "load factor",
     "transmission_error_peak_to_peak": "transmission error, peak to peak",
 }
-"""Names of the outputs that are compared, in words; those of contact loss follow."""
+"""Names of the outputs that are compared, in words; those of contact and of elements follow."""
+
+OF_ELEMENTS = ("time_apart", "force_largest", "gap_peak_to_peak")
 
 
-def table(system: "System", facts: dict[str, Any]) -> list[str]:
+def table(facts: dict[str, Any]) -> list[str]:
     """Return what a trial found as lines of text."""
     lines = [f"orbit of period {facts['period']}", "  multipliers      with control     input acts"]
     rows = zip(
@@ -169,15 +180,15 @@ def table(system: "System", facts: dict[str, Any]) -> list[str]:
             f"{facts['capture_95_percent']:.0f} for 95 %"
         ]
     lines += [
-        f"largest change of the load {_effort(system, facts['largest_effort'])}, mean "
-        f"{_effort(system, facts['mean_effort'])}"
+        f"largest change of {facts['actuator']} {_effort(facts, 'largest_effort')}, mean "
+        f"{_effort(facts, 'mean_effort')}"
     ]
     if facts["captured"]:
-        lines += [f"once captured {_effort(system, facts['final_effort'])}"]
+        lines += [f"once captured {_effort(facts, 'final_effort')}"]
     lines += ["                                     before   after"]
     for name, value in facts["before"].items():
         words = MEASURES.get(name)
-        if name.startswith("contact_loss"):
+        if name.startswith(OF_ELEMENTS):
             words = name.replace("_", " ")
         if words and name in facts["after"]:
             lines += [f"  {words:34} {value:<8.4g} {facts['after'][name]:.4g}"]
@@ -196,12 +207,14 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def _effort(system: "System", share: float) -> str:
-    """Return a share of the load as a percentage, and as a torque where the pair has one."""
-    operation = getattr(system.config, "operation", None)
-    torque = getattr(operation, "torque_Nm", None)
-    physical = f" ({abs(torque) * share:.3g} N m)" if torque else ""
-    return f"{100.0 * share:.3g} %{physical}"
+def _effort(facts: dict[str, Any], name: str) -> str:
+    """Return an effort as a percentage, and in the unit of the input where that is known."""
+    share, torque, force = (facts.get(f"{name}{end}") for end in ("", "_Nm", "_force"))
+    in_unit = f"{force:.3g}" if force is not None else ""
+    in_unit = f"{torque:.3g} N m" if torque is not None else in_unit
+    if share is None:
+        return in_unit
+    return f"{100.0 * share:.3g} %" + f" ({in_unit})" * bool(in_unit)
 
 
 main = Command("control", __doc__, ControlOptions, _control).start(__name__)

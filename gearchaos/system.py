@@ -48,7 +48,7 @@ from gearchaos.engine.running import one_thread
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Given, axis_values, configuration_of, swept_values
-from gearchaos.models.registry import system_of
+from gearchaos.models.registry import model_of, system_of
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.records.branch import PeriodicBranch
@@ -641,6 +641,27 @@ class System:
     def _at(self, values: Mapping[str, Floats]) -> kernels.LaneSystem:
         """Return the system at values of parameters, one lane per value."""
         return system_of(self.config, {**axis_values(self.config), **values})
+
+    def actuated(self, actuator: str) -> kernels.LaneSystem:
+        """Return the equations of motion with an input of the machine as their steady input.
+
+        Parameters
+        ----------
+        actuator : str
+            One of ``config.actuators``.
+
+        Returns
+        -------
+        LaneSystem
+            A batch of one lane.
+
+        Examples
+        --------
+        >>> system.actuated("load").lanes
+        1
+        """
+        model, values = model_of(self.config), axis_values(self.config)
+        return model.actuated(self.config, values, self._record, actuator)
 
     def _start(self, start: Floats | None) -> Floats:
         """Return a checked start state (states,)."""

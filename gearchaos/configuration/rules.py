@@ -7,8 +7,14 @@ from typing import Any, TypeAlias
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
-from gearchaos.configuration.run_tables import MOST_RUN_LANES, Start
-from gearchaos.configuration.tables import OF_CONTROLLERS, Tables, of_the_machine, swept_values
+from gearchaos.configuration.run_tables import MOST_RUN_LANES, Control, Start
+from gearchaos.configuration.tables import (
+    LIMITS,
+    OF_CONTROLLERS,
+    Tables,
+    of_the_machine,
+    swept_values,
+)
 
 Rule: TypeAlias = Callable[[Any], Iterator[Fault]]
 
@@ -193,23 +199,39 @@ def _the_input_can_be_changed(config: Tables) -> Iterator[Fault]:
     if control is None:
         return
     known = " or ".join(f'"{name}"' for name in config.actuators)
+    actuator = config.actuator_of(control.actuator)
     if not config.actuators:
-        yield Fault(
-            "control", "this kind of machine has no input for a controller yet", "leave it out"
-        )
-    elif control.actuator not in config.actuators:
+        rule = "the machine has no input that a controller could change"
+        yield Fault("control", rule, "give it a force or a torque, or leave out [control]")
+    elif not actuator:
+        rule = "is missing: the machine has several inputs"
+        yield Fault("control.actuator", rule, f"set actuator = {known}")
+    elif actuator not in config.actuators:
         rule = f"a controller can change {known} only"
-        if control.actuator == "speed":
+        if actuator == "speed":
             rule += "; another speed would change the length of the mesh period itself"
-        yield Fault("control.actuator", rule, f"set actuator = {known}", control.actuator)
+        yield Fault("control.actuator", rule, f"set actuator = {known}", actuator)
+    yield from _limit_faults(config, control)
+
+
+def _limit_faults(config: Tables, control: Control[str]) -> Iterator[Fault]:
+    """The limit is given once, in a unit that the input has."""
+    absolute = config.absolute_limit
     given = [
         name
-        for name in ("limit", "limit_Nm")
+        for name in LIMITS
         if getattr(control, name) is not None or f"control.{name}" in config.swept
     ]
     if len(given) != 1:
         rule = "is given in two units" if given else "is missing"
-        yield Fault("control.limit", rule, "give limit, a share, or limit_Nm, or sweep one of them")
+        remedy = f"give limit, a share, or {absolute}, or sweep one of them"
+        yield Fault("control.limit", rule, remedy)
+    elif given[0] not in ("limit", absolute):
+        rule = "is in a unit that the input does not have"
+        yield Fault(f"control.{given[0]}", rule, f"give limit, a share, or {absolute}")
+    elif given[0] == "limit" and config.is_idle(config.actuator_of(control.actuator)):
+        rule = "is a share of the steady input, which is 0"
+        yield Fault("control.limit", rule, f"give {absolute} instead")
 
 
 @GENERIC_RULES.reads("control", "scene")

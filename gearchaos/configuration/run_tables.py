@@ -83,7 +83,9 @@ class Control(Table, Generic[State]):
     found_at: float | None = key(example=12.47, default=None)
     """value of the swept parameter at which the motion is searched for the orbit, by default the
     one in the middle; from there the orbit is followed to all other values"""
-    actuator: str = key("the input that the controller changes", default="load")
+    actuator: str | None = key(example="load", default=None)
+    """the input that the controller changes: "load" of a gear pair, the name of a force of a linear
+    machine, or the shaft or loaded member whose torque it is; by default the only one there is"""
     gain: Literal["lqr", "placement", "delayed"] = key(default="lqr")
     """linear-quadratic gain; placement of the unstable multipliers at 0; or the linear-quadratic
     gain times the difference from the state one orbit earlier"""
@@ -101,6 +103,8 @@ class Control(Table, Generic[State]):
     limit_Nm: float | None = key(
         "largest change of the torque", "N m", example=5.0, default=None, ge=0
     )
+    limit_force: float | None = key(default=None, ge=0)
+    """largest change of the force of a linear machine, in the units of its forces"""
     measured: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
         "states that are measured, the others are estimated; by default all are known",
         example=["delta_5", "delta_5_rate"],

@@ -68,6 +68,8 @@ class Tables(Titled):
         Tables that must be free of faults before `lane_faults` is called.
     actuators : tuple of str
         Inputs that a controller can change.
+    absolute_limit : str
+        Key of [control] for the largest change of an input in its own unit.
     """
 
     parameters: ClassVar[Mapping[str, Parameter]] = MappingProxyType({})
@@ -75,6 +77,7 @@ class Tables(Titled):
     discrete_parameters: ClassVar[frozenset[str]] = frozenset()
     tables_of_lanes: ClassVar[frozenset[str]] = frozenset({"sweep", "second_sweep", "scene"})
     actuators: ClassVar[tuple[str, ...]] = ()
+    absolute_limit: ClassVar[str] = "limit_Nm"
 
     scene: Scene = key("which effects exist", default=Scene())
     start: Start[str] = key("the state in which the lanes start", default=Start())
@@ -97,6 +100,16 @@ class Tables(Titled):
     def swept(self) -> dict[str, str]:
         """The key that names each swept parameter, such as ``sweep.parameter``."""
         return {sweep.parameter: f"{table}.parameter" for table, sweep in self.sweeps.items()}
+
+    def is_idle(self, actuator: str) -> bool:
+        """Whether the steady value of an input is 0, so that nothing is a share of it."""
+        del actuator
+        return False
+
+    def actuator_of(self, given: str | None) -> str:
+        """Return the input that a controller changes, by default the only one; "" if none is."""
+        alone = self.actuators[0] if len(self.actuators) == 1 else ""
+        return alone if given is None else given
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -171,6 +184,10 @@ OF_CONTROLLERS = MappingProxyType(
     }
 )
 """Keys of [control] that a sweep may vary, by path; the machine does not depend on them."""
+
+
+LIMITS = ("limit", "limit_Nm", "limit_force")
+"""Keys of [control] for the largest change of the input: a share, or a value in its unit."""
 
 
 def of_the_machine(config: Tables) -> dict[str, Sweep]:

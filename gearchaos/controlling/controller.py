@@ -1,4 +1,4 @@
-"""Control of a gear pair by its load: it keeps the pair on a periodic orbit.
+"""Control of a machine by its load or a force: it keeps the machine on a periodic orbit.
 
 >>> import gearchaos
 >>> system = gearchaos.System("sweeps/pan2021.toml", pitch_error=12.47)
@@ -16,6 +16,8 @@ from gearchaos.dynamics.control import controllability, require_controllable, so
 from gearchaos.dynamics.controllers import ControlSettings, Designed, Target, control_of
 from gearchaos.dynamics.following import Orbit
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import axis_values
+from gearchaos.models.registry import model_of
 from gearchaos.records.control import ControlledMotion, distance_from, reach_of
 from gearchaos.system import System
 
@@ -30,7 +32,7 @@ LEAST_TRANSIENT = 300
 
 
 class Controller:
-    """A controller that keeps a system on a periodic orbit by its load.
+    """A controller that keeps a system on a periodic orbit by its load or another input.
 
     Parameters
     ----------
@@ -39,10 +41,14 @@ class Controller:
     orbit : Orbit
         The target, stable or unstable, of `System.orbit` or `System.orbits`.
     settings : ControlSettings, optional
-        How the controller is designed.
+        How the controller is designed, and which input it changes.
 
     Attributes
     ----------
+    actuator : str
+        Name of the input.
+    equations : LaneSystem
+        The equations of motion with this input as their steady one.
     gain : array, shape (mesh periods, states)
         Gains K of u = -K (x - r), one for each mesh period of the orbit.
     multipliers, closed_multipliers : array of complex, shape (states,)
@@ -53,12 +59,12 @@ class Controller:
     Raises
     ------
     ConfigurationError
-        If a setting is out of its range, if the model has no load, or if the load does not act on
-        an unstable mode.
+        If a setting is out of its range, if the machine has no such input, or if the input does not
+        act on an unstable mode.
 
     Notes
     -----
-    Once per mesh period the controller adds u to the load. The linearised map of the section is
+    Once per mesh period the controller adds u to the input. The linearised map of the section is
     x' = J x + b u, with J and b from tangent vectors. The gain minimises the sum of q |x|^2 + r u^2
     (discrete Riccati equation). With measured states only, a Kalman filter estimates the others.
 
@@ -76,19 +82,52 @@ class Controller:
         instance("system", system, System, "System(config) makes one")
         instance("orbit", orbit, Orbit, "System.orbit finds one")
         self.system, self.orbit = system, orbit
-        self.settings = _checked(settings or ControlSettings(), system.states)
-        target = Target.at(system.equations, orbit.point, orbit.period, system.plan)
+        self.settings = _checked(settings or ControlSettings(), system)
+        self.actuator = system.config.actuator_of(self.settings.actuator)
+        self.equations = system.actuated(self.actuator)
+        self._limit = self._largest_input()
+        target = Target.at(self.equations, orbit.point, orbit.period, system.plan)
         self.maps, self.scales = target.maps, target.scales
         require_controllable(self.maps, system.config.source)
         self.multipliers, self.shares = controllability(self.maps)
         self.gain = target.gain(self.settings)
-        self._control = control_of([Designed(target, self.gain, self.settings)], system.equations)
+        self._control = control_of([Designed(target, self.gain, self.settings)], self.equations)
         self.closed_multipliers: Complex = sorted_multipliers(self.maps.closed(self.gain))
 
     @property
     def load(self) -> float:
-        """The dimensionless load without control."""
-        return float(self.system.equations.steady_input[0])
+        """The input without control, in the units of the equations, such as the load."""
+        return float(self.equations.steady_input[0])
+
+    @property
+    def unit(self) -> tuple[float, str]:
+        """Size of an input of 1 in its own unit, and the name of this unit.
+
+        The name is "Nm" or "force", and empty for a dimensionless load.
+        """
+        config = self.system.config
+        found = model_of(config).input_unit(config, axis_values(config))
+        if found is None:
+            return 1.0, ""
+        return float(np.ravel(found)[0]), config.absolute_limit.removeprefix("limit_")
+
+    def _largest_input(self) -> float:
+        """Return the limit in the units of the equations."""
+        given, source = self.settings.limit_absolute, self.system.config.source
+        if given is not None:
+            size, unit = self.unit
+            if not unit:
+                raise ConfigurationError(
+                    f"{source}: limit_absolute: no torque in N m determines the load; give "
+                    "operation.torque_Nm, or limit as a share of the load"
+                )
+            return given / size
+        if self.load == 0.0:
+            raise ConfigurationError(
+                f"{source}: limit: is a share of {self.actuator}, whose steady value is 0; give "
+                "limit_absolute (--limit-absolute) in its unit"
+            )
+        return self.settings.limit * abs(self.load)
 
     def control(self, lanes: int) -> Control:
         """Return the controller for the kernels.
@@ -112,7 +151,7 @@ class Controller:
         seeds = np.empty(lanes, dtype=np.uint64)
         seeds[:] = np.random.SeedSequence(self.settings.seed).generate_state(lanes, np.uint64)
         return self._control.of(np.zeros(lanes, dtype=np.intp))._replace(
-            limit=np.full(lanes, self.settings.limit * abs(self.load)), seeds=seeds
+            limit=np.full(lanes, self._limit), seeds=seeds
         )
 
     def starts(self, count: int) -> Floats:
@@ -201,11 +240,11 @@ class Controller:
         (2, 10)
         """
         lanes = len(states)
-        system = self.system.equations.of(np.zeros(lanes, dtype=np.intp))
+        system = self.equations.of(np.zeros(lanes, dtype=np.intp))
         return kernels.integrate(system.controlled(self.control(lanes)), states, plan)
 
 
-def _checked(given: ControlSettings, states: tuple[str, ...]) -> ControlSettings:
+def _checked(given: ControlSettings, system: System) -> ControlSettings:
     """Return settings, or raise ConfigurationError for one out of its range."""
     instance("settings", given, ControlSettings, "ControlSettings() has the defaults")
     one_of("method", given.method, METHODS)
@@ -216,5 +255,27 @@ def _checked(given: ControlSettings, states: tuple[str, ...]) -> ControlSettings
     whole_number("begins", given.begins, least=0)
     whole_number("seed", given.seed, least=0)
     for name in given.measured:
-        one_of("measured", name, states)
+        one_of("measured", name, system.states)
+    if given.limit_absolute is not None:
+        value = finite_number("limit_absolute", given.limit_absolute)
+        if value <= 0.0:
+            raise ConfigurationError(f"limit_absolute: is {value:g}, and must be positive")
+    _check_actuator(given.actuator, system)
     return given
+
+
+def _check_actuator(given: str | None, system: System) -> None:
+    """Raise ConfigurationError unless a machine has the input, or only one if none is given."""
+    config = system.config
+    known, actuator = config.actuators, config.actuator_of(given)
+    if not known:
+        raise ConfigurationError(
+            f"{config.source}: the machine has no input that a controller could change; give it a "
+            "force or a torque"
+        )
+    if not actuator:
+        raise ConfigurationError(
+            f"{config.source}: actuator: is missing: the machine has several inputs; choose one of "
+            f"{', '.join(known)}"
+        )
+    one_of("actuator", actuator, known)

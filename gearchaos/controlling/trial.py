@@ -60,9 +60,22 @@ class ControlTrial(NamedTuple):
         """
         controller = self.controller
         symbols = catalogue_symbols(controller)
-        return ControlDrawing(
-            self.motion, controller.load, controller.maps.points, self.free, self.held, symbols
-        )
+        scale, words = _drawn_input(controller)
+        target = controller.maps.points
+        return ControlDrawing(self.motion, scale, words, target, self.free, self.held, symbols)
+
+
+UNITS = {"Nm": "N m", "force": "", "": ""}
+"""How the units of `Controller.unit` are written."""
+
+
+def _drawn_input(controller: Controller) -> tuple[float, str]:
+    """Return the factor of inputs in a figure, and the label of the axis."""
+    name = controller.actuator
+    if controller.load:
+        return 100.0 / abs(controller.load), f"change of the {name} (%)"
+    size, unit = controller.unit
+    return size, f"change of {name}" + f" ({UNITS[unit]})" * bool(UNITS[unit])
 
 
 def try_controller(controller: Controller, starts: int, periods: int) -> ControlTrial:
@@ -108,7 +121,7 @@ def _measures(controller: Controller, states: Floats, *, controlled: bool) -> di
         loads=True,
         contact=controller.system.equations.clearance,
     )
-    system = controller.system.equations.of(np.zeros(len(states), dtype=np.intp))
+    system = controller.equations.of(np.zeros(len(states), dtype=np.intp))
     control = controller.control(len(states)) if controlled else None
     outcome = kernels.integrate(system.controlled(control), states, plan)
     found: dict[str, Any] = dict(run.lanes.model.loads(outcome.loads, system))
@@ -123,10 +136,19 @@ def _measures(controller: Controller, states: Floats, *, controlled: bool) -> di
 
 
 def facts_of(trial: ControlTrial) -> dict[str, Any]:
-    """Return what a trial found, by name; inputs are shares of the load."""
+    """Return what a trial found, by name.
+
+    Efforts are shares of the steady input, None if that is 0, and in the unit of the input.
+    """
     controller, motion = trial.controller, trial.motion
     captured = int(motion.captured.sum())
-    share = np.abs(motion.inputs) / abs(controller.load)
+    size = np.abs(motion.inputs)
+    held = size[motion.captured, -1]
+    efforts = {
+        "largest_effort": float(size.max()),
+        "mean_effort": float(size.mean()),
+        "final_effort": float(held.max()) if captured else None,
+    }
     low, high = wilson_interval(captured, len(motion.captured)).tolist()
     times = motion.capture_time[motion.captured]
     return {
@@ -142,9 +164,25 @@ def facts_of(trial: ControlTrial) -> dict[str, Any]:
         "captured_high": high,
         "capture_median": float(np.median(times)) if times.size else None,
         "capture_95_percent": float(np.percentile(times, 95)) if times.size else None,
-        "largest_effort": float(share.max()),
-        "mean_effort": float(share.mean()),
-        "final_effort": float(share[motion.captured, -1].max()) if captured else None,
+        "actuator": controller.actuator,
+        **_scaled(efforts, 1.0 / abs(controller.load) if controller.load else None),
+        **_in_unit(efforts, controller),
         "before": trial.before,
         "after": trial.after,
     }
+
+
+def _scaled(efforts: dict[str, float | None], factor: float | None) -> dict[str, float | None]:
+    """Return efforts times a factor; all are None without one."""
+    return {
+        name: None if value is None or factor is None else value * factor
+        for name, value in efforts.items()
+    }
+
+
+def _in_unit(efforts: dict[str, float | None], controller: Controller) -> dict[str, float | None]:
+    """Return efforts in the unit of the input, with its name; nothing if it is not known."""
+    size, unit = controller.unit
+    if not unit:
+        return {}
+    return {f"{name}_{unit}": value for name, value in _scaled(efforts, size).items()}

@@ -32,7 +32,7 @@ class ControlSettings(NamedTuple):
     state_weight, input_weight : float
         Weights of the squared deviation and of the squared input in the cost, dimensionless.
     limit : float
-        Largest input as a share of the load. Where more is needed, the input is 0.
+        Largest input as a share of the steady input. Where more is needed, the input is 0.
     measured : tuple of str
         Names of the states that are measured; the others are estimated. By default all are known.
     noise : float
@@ -41,6 +41,12 @@ class ControlSettings(NamedTuple):
         Mesh period in which control begins.
     seed : int
         Seed of the noise.
+    actuator : str or None
+        The input: the load of a gear pair, a force of a machine, a shaft whose torque it is; by
+        default the only one.
+    limit_absolute : float or None
+        Largest input in its own unit, in place of ``limit``: N m, or that of the forces of a
+        machine.
     """
 
     method: str = "lqr"
@@ -51,6 +57,8 @@ class ControlSettings(NamedTuple):
     noise: float = 0.0
     begins: int = 0
     seed: int = 0
+    actuator: str | None = None
+    limit_absolute: float | None = None
 
 
 class Target(NamedTuple):

@@ -14,11 +14,12 @@ EFFORTS = ("largest", "mean", "recorded")
 """Endings of the names of efforts."""
 
 
-def has_torque(run: RunPlan) -> bool:
-    """Whether efforts of a controlled run are known in N m."""
+def input_unit(run: RunPlan) -> str:
+    """Return the unit of the input, as names of efforts end, of a controlled run; "" if unknown."""
     if run.config.control is None:
-        return False
-    return run.lanes.model.torque(run.config, run.lanes.values_of(np.arange(1))) is not None
+        return ""
+    known = run.lanes.model.input_unit(run.config, run.lanes.values_of(np.arange(1)))
+    return "" if known is None else run.config.absolute_limit.removeprefix("limit_")
 
 
 def control_arrays(
@@ -43,14 +44,18 @@ def control_arrays(
     # With noise the motion may be near the orbit by chance; without, an input may be exactly 0.
     held &= (noise == 0.0) | (outcome.inputs[:, last] != 0.0).all(axis=1)
     state[(state == NOT_CAPTURED) & held] = CAPTURED
-    share = np.abs(outcome.inputs) / np.abs(system.steady_input)[:, np.newaxis]
-    share[outcome.status != kernels.Status.OK] = np.nan
-    acting = share[:, min(control.begins, share.shape[1] - 1) :]
-    recorded = share[:, run.plan.transient_periods :]
-    efforts = acting.max(axis=1), acting.mean(axis=1), recorded.mean(axis=1)
+    size = np.abs(outcome.inputs)
+    size[outcome.status != kernels.Status.OK] = np.nan
+    acting = size[:, min(control.begins, size.shape[1] - 1) :]
+    recorded = size[:, run.plan.transient_periods :]
+    means = acting.max(axis=1), acting.mean(axis=1), recorded.mean(axis=1)
+    efforts = dict(zip(EFFORTS, means, strict=True))
+    # Nothing is a share of a steady input of 0.
+    steady = np.where(system.steady_input, np.abs(system.steady_input), np.nan)
     arrays: dict[str, Array] = {"capture": state}
-    arrays |= {f"effort_{name}": values for name, values in zip(EFFORTS, efforts, strict=True)}
-    torque = controllers.torque_of(lanes, values)
-    if torque is not None:
-        arrays |= {f"{name}_Nm": arrays[name] * torque for name in [*arrays][1:]}
+    arrays |= {f"effort_{name}": effort / steady for name, effort in efforts.items()}
+    unit = controllers.unit_of(lanes, values)
+    if unit is not None:
+        end = input_unit(run)
+        arrays |= {f"effort_{name}_{end}": effort * unit for name, effort in efforts.items()}
     return arrays

@@ -46,7 +46,7 @@ class Controllers:
         designs, rows = self._designs_of(lanes, values)
         control = control_of([design for design, _ in designs], system).of(rows)
         idle = np.array([state != NOT_CAPTURED for _, state in designs])[rows]
-        limit = self._limit(lanes, values) * np.abs(system.steady_input)
+        limit = self._limit(lanes, values, system)
         factor = self._setting("gain_factor", lanes, values)
         return control._replace(
             # With a negative limit, no input is ever small enough.
@@ -59,35 +59,45 @@ class Controllers:
         """Return `NOT_CAPTURED` for lanes with a controller, otherwise why they have none."""
         designs, rows = self._designs_of(lanes, values)
         states = np.array([state for _, state in designs], dtype=np.uint8)[rows]
-        off = self._limit(lanes, values) == 0.0
+        off = self._setting(self._limit_key(values), lanes, values) == 0.0
         return np.where(off, np.uint8(OFF), states)
 
     def noise_of(self, lanes: Integers, values: Mapping[str, Floats]) -> Floats:
         """Return the noise of lanes in the scales of the states, (lanes,)."""
         return self._setting("noise", lanes, values)
 
-    def torque_of(self, lanes: Integers, values: Mapping[str, Floats]) -> Floats | None:
-        """Return the size of the torque of lanes in N m, (lanes,); None if it is not known."""
+    def unit_of(self, lanes: Integers, values: Mapping[str, Floats]) -> Floats | None:
+        """Return the size of an input of 1 in N m or force, (lanes,); None if it is not known."""
         run = self._run
-        torque = run.lanes.model.torque(run.config, values)
-        return None if torque is None else np.broadcast_to(np.abs(torque), lanes.shape)
+        unit = run.lanes.model.input_unit(run.config, values)
+        return None if unit is None else np.broadcast_to(unit, lanes.shape)
 
     def _setting(self, name: str, lanes: Integers, values: Mapping[str, Floats]) -> Floats:
         """Return the value of a key of [control] in every lane, (lanes,)."""
         value = values.get(f"control.{name}", getattr(self._control, name))
         return np.broadcast_to(np.asarray(value, dtype=np.float64), lanes.shape)
 
-    def _limit(self, lanes: Integers, values: Mapping[str, Floats]) -> Floats:
-        """Return the limits of lanes as shares of the load, (lanes,)."""
-        if self._control.limit_Nm is None and "control.limit_Nm" not in values:
-            return self._setting("limit", lanes, values)
-        torque = self.torque_of(lanes, values)
-        if torque is None:
+    def _limit_key(self, values: Mapping[str, Floats]) -> str:
+        """Return the key of the limit: that of a share, or of a value in the unit of the input."""
+        absolute = self._run.config.absolute_limit
+        given = getattr(self._control, absolute) is not None or f"control.{absolute}" in values
+        return absolute if given else "limit"
+
+    def _limit(
+        self, lanes: Integers, values: Mapping[str, Floats], system: kernels.LaneSystem
+    ) -> Floats:
+        """Return the limits of lanes in the units of the equations, (lanes,)."""
+        key = self._limit_key(values)
+        limit = self._setting(key, lanes, values)
+        if key == "limit":
+            return limit * np.abs(system.steady_input)
+        unit = self.unit_of(lanes, values)
+        if unit is None:
             raise ConfigurationError(
-                f"{self._run.config.source}: control.limit_Nm: needs operation.torque_Nm, from "
+                f"{self._run.config.source}: control.{key}: needs operation.torque_Nm, from "
                 "which the load follows; give that, or control.limit as a share of the load"
             )
-        return self._setting("limit_Nm", lanes, values) / torque
+        return limit / unit
 
     def _designs_of(
         self, lanes: Integers, values: Mapping[str, Floats]
@@ -154,15 +164,18 @@ def described(run: RunPlan, orbits: TargetOrbits) -> str:
     """Return what is controlled, in words."""
     control = run.config.control
     assert control is not None
-    if "control.limit" in run.config.swept or "control.limit_Nm" in run.config.swept:
+    absolute = run.config.absolute_limit
+    value = getattr(control, absolute)
+    if not {"control.limit", f"control.{absolute}"}.isdisjoint(run.config.swept):
         limit = "within the swept limits"
-    elif control.limit_Nm is None:
+    elif value is None:
         limit = f"within {100.0 * (control.limit or 0.0):g} % of it"
     else:
-        limit = f"within {control.limit_Nm:g} N m"
+        limit = f"within {value:g}{' N m' if absolute == 'limit_Nm' else ''}"
+    actuator = run.config.actuator_of(control.actuator)
     along = f" for {orbits.exists} of {orbits.values.size} values" if orbits.parameter else ""
     return (
-        f"{control.actuator} {limit}, {control.gain}, period-{control.period} orbit found"
+        f"{actuator} {limit}, {control.gain}, period-{control.period} orbit found"
         f"{orbits.place}{along}, from mesh period {control.begins} on"
     )
 

@@ -11,7 +11,7 @@ from gearchaos.dynamics.exponents import contact_shares, exponents, sum_of_expon
 from gearchaos.dynamics.labelling import Labelled, labels_of
 from gearchaos.dynamics.largest_exponents import RECORD_MEANINGS, largest_exponents
 from gearchaos.engine import error_check
-from gearchaos.engine.capture import control_arrays, has_torque
+from gearchaos.engine.capture import control_arrays, input_unit
 from gearchaos.engine.claims import completed
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.steps import solution_of
@@ -58,7 +58,8 @@ def variables_of(run: RunPlan) -> list[Variable]:
         catalogue.ORDERS_PART: bool(run.plan.orders),
         catalogue.AMPLITUDES_PART: signals if run.plan.orders else (),
         catalogue.CONTROL_PART: run.config.control is not None,
-        catalogue.CONTROL_TORQUE_PART: has_torque(run),
+        catalogue.CONTROL_TORQUE_PART: input_unit(run) == "Nm",
+        catalogue.CONTROL_FORCE_PART: input_unit(run) == "force",
         catalogue.CHECK_PART: run.config.integration.error_check > 0.0,
         catalogue.EVERY_SWEEP_PART: True,
     }

@@ -23,8 +23,10 @@ class ControlDrawing(NamedTuple):
     ----------
     motion : ControlledMotion
         Motions with control from many starts.
-    load : float
-        The load without control, dimensionless.
+    scale : float
+        Factor of the inputs in the figure, such as 100 over the load.
+    words : str
+        Label of the axis of the inputs.
     target : array, shape (mesh periods, states)
         The section points of the target orbit.
     free, held : array, shape (samples, states)
@@ -34,7 +36,8 @@ class ControlDrawing(NamedTuple):
     """
 
     motion: ControlledMotion
-    load: float
+    scale: float
+    words: str
     target: Floats
     free: Floats
     held: Floats
@@ -52,9 +55,9 @@ def control_page(shown: ControlDrawing) -> Page:
     Returns
     -------
     Page
-        Four panels: the section of some starts over time with the target orbit, the input as a
-        share of the load, the distribution of capture times, and the motion in the plane of the
-        first state and its rate, before and after.
+        Four panels: the section of some starts over time with the target orbit, the input, the
+        distribution of capture times, and the motion in the plane of the first state and its rate,
+        before and after.
 
     Examples
     --------
@@ -97,14 +100,14 @@ def shown_periods(motion: ControlledMotion) -> int:
 
 
 def draw_inputs(axes: Axes, shown: ControlDrawing) -> None:
-    """Draw the input as a share of the load over time, for the same starts."""
-    share = 100.0 * shown.motion.inputs[:SHOWN_STARTS] / abs(shown.load)
-    time = np.arange(share.shape[1])
-    for values, colour in zip(share, COLOURS, strict=False):
+    """Draw the input over time, for the same starts."""
+    inputs = shown.scale * shown.motion.inputs[:SHOWN_STARTS]
+    time = np.arange(inputs.shape[1])
+    for values, colour in zip(inputs, COLOURS, strict=False):
         axes.plot(time, values, color=colour, linewidth=0.5, drawstyle="steps-post")
     axes.set_xlim(0, shown_periods(shown.motion))
     axes.set_xlabel("mesh periods with control")
-    axes.set_ylabel("change of the load (%)")
+    axes.set_ylabel(shown.words)
 
 
 def draw_capture_times(axes: Axes, motion: ControlledMotion) -> None:

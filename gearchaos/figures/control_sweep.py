@@ -16,7 +16,7 @@ from gearchaos.outputs.names import axis_name
 from gearchaos.records.control import CAPTURED
 from gearchaos.results.reading.result import Result, section_variables
 
-LIMITS = tuple(axis_name(f"control.{name}") for name in ("limit", "limit_Nm"))
+LIMITS = tuple(axis_name(f"control.{name}") for name in ("limit", "limit_Nm", "limit_force"))
 """Axes along which the value 0 is the machine without control."""
 
 SHARES = "cividis"
@@ -143,7 +143,7 @@ def _parts(result: Result) -> tuple[Result | None, Result]:
 def _words(held: Result) -> str:
     """Return what the diagram with control shows, in words."""
     limit = held.fixed.get(LIMITS[0])
-    within = "" if limit is None else f", at most {100.0 * limit:g} % of the load"
+    within = "" if limit is None else f", at most {100.0 * limit:g} % of the input"
     return f"with control{within}"
 
 
@@ -165,11 +165,27 @@ def _mark_others(axes: Axes, held: Result, between: Between) -> None:
         axes.legend(loc="lower center", **LEGEND)
 
 
+def _unit_of_efforts(held: Result) -> tuple[float, str, str]:
+    """Return the factor of the drawn efforts, the end of their names, and their unit.
+
+    They are shares in percent, or values in the unit of an input whose steady value is 0.
+    """
+    if np.isfinite(held["effort_largest"]).any():
+        return 100.0, "", " (%)"
+    for end in ("_Nm", "_force"):
+        if f"effort_largest{end}" in held.variables:
+            unit = unit_of(held, f"effort_largest{end}")
+            return 1.0, end, f" ({unit})" * bool(unit)
+    return 100.0, "", " (%)"
+
+
 def draw_efforts(axes: Axes, held: Result, between: Between) -> None:
-    """Draw the largest and the mean effort of every lane, in percent."""
+    """Draw the largest and the mean effort of every lane."""
     lanes = diagram_lanes(held, between)
+    factor, end, unit = _unit_of_efforts(held)
     largest, mean = (
-        100.0 * held.lanes(name)[lanes.numbers] for name in ("effort_largest", "effort_mean")
+        factor * held.lanes(f"{name}{end}")[lanes.numbers]
+        for name in ("effort_largest", "effort_mean")
     )
     look: dict[str, Any] = {"marker": "o", "markersize": 1.8, "markeredgewidth": 0.0}
     look["linestyle"] = "none"
@@ -178,6 +194,6 @@ def draw_efforts(axes: Axes, held: Result, between: Between) -> None:
     axes.set_yscale("log")
     top = max(float(np.nanmax(largest, initial=0.0)), 1e-12)
     axes.set_ylim(top * LEAST_SHOWN, 3.0 * top)
-    axes.set_ylabel("Change of the load (%)")
+    axes.set_ylabel(f"Change of the input{unit}")
     axes.set_xlabel(axis_label(held, swept_axes(held)[0]))
     axes.legend(loc="center right", **LEGEND)

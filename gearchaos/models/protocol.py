@@ -121,8 +121,21 @@ class Model(ABC):
         del config, values
         return Scales()
 
-    def torque(self, config: Any, values: Mapping[str, Floats]) -> Floats | None:
-        """Return the torque in N m behind the steady input of some lanes, None if not known."""
+    def actuated(
+        self, config: Any, values: Mapping[str, Floats], system: LaneSystem, actuator: str
+    ) -> LaneSystem:
+        """Return the system of some lanes such that its steady input is an actuator.
+
+        By default a model has one steady input.
+        """
+        del config, values, actuator
+        return system
+
+    def input_unit(self, config: Any, values: Mapping[str, Floats]) -> Floats | None:
+        """Return the size of an input of 1 in its own unit, N m or force, None if not known.
+
+        An array that broadcasts to (lanes,).
+        """
         del config, values
         return None
 

@@ -30,7 +30,7 @@ def model_of(config: Configuration) -> Model:
 def system_of(
     config: Configuration, values: Mapping[str, Floats], effects: Collection[str] | None = None
 ) -> LaneSystem:
-    """Return the equations of motion of some lanes.
+    """Return the equations of motion of some lanes, with the actuator of their controllers.
 
     Parameters
     ----------
@@ -42,4 +42,8 @@ def system_of(
         Effects that act, by default those of the scene.
     """
     acting = config.scene.effects if effects is None else effects
-    return model_of(config).system(config, values, acting)
+    model = model_of(config)
+    system = model.system(config, values, acting)
+    if config.control is None:
+        return system
+    return model.actuated(config, values, system, config.actuator_of(config.control.actuator))

@@ -235,21 +235,23 @@ CONTROL_PART = Part(
         ),
     ),
 )
+
+
+def _absolute_efforts(unit: str, what: str, scale: Quantity) -> tuple[Output, ...]:
+    """Return the efforts in the unit of the input; ``unit``: end of their names."""
+    changes = f"mean size of the change of the {what}"
+    return (
+        Output(f"effort_largest_{unit}", f"largest change of the {what}", scale=scale),
+        Output(f"effort_mean_{unit}", f"{changes} since control began", scale=scale),
+        Output(f"effort_recorded_{unit}", f"{changes} in the recorded periods", scale=scale),
+    )
+
+
 CONTROL_TORQUE_PART = Part(
-    "with control of a load that follows from a torque",
-    (
-        Output("effort_largest_Nm", "largest change of the torque", scale=Quantity.TORQUE),
-        Output(
-            "effort_mean_Nm",
-            "mean size of the change of the torque since control began",
-            scale=Quantity.TORQUE,
-        ),
-        Output(
-            "effort_recorded_Nm",
-            "mean size of the change of the torque in the recorded periods",
-            scale=Quantity.TORQUE,
-        ),
-    ),
+    "with control of a known torque", _absolute_efforts("Nm", "torque", Quantity.TORQUE)
+)
+CONTROL_FORCE_PART = Part(
+    "with control of a force", _absolute_efforts("force", "force", Quantity.FORCE)
 )
 CHECK_PART = Part(
     "with an error check",
@@ -349,6 +351,7 @@ PARTS = (
     AMPLITUDES_PART,
     CONTROL_PART,
     CONTROL_TORQUE_PART,
+    CONTROL_FORCE_PART,
     CHECK_PART,
     EVERY_SWEEP_PART,
     TIME_PART,

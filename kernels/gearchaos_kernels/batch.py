@@ -228,13 +228,10 @@ def _actuation(system: LaneSystem, step: Floats, plan: Plan, inputs: Floats) -> 
         return np.zeros(0)
     model = provider_of(system.flags())
     column = model.lane._fields.index(model.actuated)
-    one, none = (
-        system.with_steady_input(np.full(system.lanes, value)).coefficients(step)[:, column]
-        for value in (1.0, 0.0)
-    )
     about = np.array([column, plan.first_period, control.begins, control.repeats])
     given = {name: getattr(control, name) for name in Actuation._fields[:-3]}
-    return Actuation(**given, strength=one - none, inputs=inputs, about=about)
+    strength = system.input_strength(step)
+    return Actuation(**given, strength=strength, inputs=inputs, about=about)
 
 
 def _turns(orders: Floats, steps: NDArray[np.intp]) -> Floats:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
 from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
 from gearchaos_kernels.methods.protocol import begin_lane
@@ -296,7 +296,7 @@ class Actuation(NamedTuple):
     about: NDArray[np.intp]
 
 
-@scalar
+@part
 def act(memory, block, period, batch, control, given, scene):
     """Choose the input of all lanes of a block for a mesh period, and its variation.
 
@@ -320,7 +320,7 @@ def act(memory, block, period, batch, control, given, scene):
             if used:
                 sources = at.known_varied, at.kept_varied
                 varied = demanded(memory, slot, place, sources, 0.0, control, scene)
-        predict(memory, slot, index, nearest, (effort, varied), control, scale, scene)
+        predict(memory, slot, index, nearest, (effort, varied), control, scene)
         strength = control.strength[index]
         coefficient = batch.coefficients[index, column] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
@@ -339,15 +339,15 @@ def state_at(memory, slot, state, scale):
 @scalar
 def prepare(memory, slot, points, scale, scene):
     """Begin the estimate at the first point of the orbit, and the delay at the first state."""
-    first = control_rows(scene).kept
-    for state in range(scale.shape[0]):
+    first, states = control_rows(scene).kept, control_rows(scene).states
+    for state in range(states):
         if scene.feedback.estimated is not None:
             memory[(first + state) * STRIDE + slot] = points[0, state]
             memory[(control_rows(scene).kept_varied + state) * STRIDE + slot] = 0.0
         for earlier in range(control_rows(scene).delay):
-            row = first + earlier * scale.shape[0] + state
+            row = first + earlier * states + state
             memory[row * STRIDE + slot] = state_at(memory, slot, state, scale)
-            varied = control_rows(scene).kept_varied + earlier * scale.shape[0] + state
+            varied = control_rows(scene).kept_varied + earlier * states + state
             memory[varied * STRIDE + slot] = 0.0
 
 
@@ -357,7 +357,7 @@ def measure(memory, slot, index, phase, control, scale, scene):
     known, kept = control_rows(scene).known, control_rows(scene).kept
     known_varied, kept_varied = control_rows(scene).known_varied, control_rows(scene).kept_varied
     tangent = rows(scene).tangent
-    states = scale.shape[0]
+    states = control_rows(scene).states
     for state in range(states):
         if scene.feedback.estimated is None:
             value = state_at(memory, slot, state, scale)
@@ -374,24 +374,30 @@ def measure(memory, slot, index, phase, control, scale, scene):
                 varied = memory[(kept_varied + state) * STRIDE + slot]
                 memory[(known_varied + state) * STRIDE + slot] = varied
     if scene.feedback.estimated is not None:
-        place = nearest_point(memory, slot, phase, control, index, scale, scene)
-        signals = control.measured.shape[0]
-        for signal in range(signals):
-            state = control.measured[signal]
-            value = state_at(memory, slot, state, scale)
-            value += control.noise[index, signal] * gaussian(
-                control.seeds[index], phase * signals + signal
-            )
-            error = value - memory[(kept + state) * STRIDE + slot]
-            for row in range(states):
-                factor = control.correction[index, place, row, signal]
-                memory[(known + row) * STRIDE + slot] += factor * error
+        correct(memory, slot, index, phase, control, scale, scene)
+
+
+@scalar
+def correct(memory, slot, index, phase, control, scale, scene):
+    """Correct the estimate of a lane, and its variation, by what is measured."""
+    at, tangent = control_rows(scene), rows(scene).tangent
+    place = nearest_point(memory, slot, phase, control, index, scale, scene)
+    signals = control.measured.shape[0]
+    for signal in range(signals):
+        state, varied = control.measured[signal], 0.0
+        value = state_at(memory, slot, state, scale)
+        noise = control.noise[index, signal]
+        if noise > 0.0:
+            value += noise * gaussian(control.seeds[index], phase * signals + signal)
+        error = value - memory[(at.kept + state) * STRIDE + slot]
+        if scene.tangent is not None:
+            varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
+            varied -= memory[(at.kept_varied + state) * STRIDE + slot]
+        for row in range(at.states):
+            factor = control.correction[index, place, row, signal]
+            memory[(at.known + row) * STRIDE + slot] += factor * error
             if scene.tangent is not None:
-                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-                varied -= memory[(kept_varied + state) * STRIDE + slot]
-                for row in range(states):
-                    factor = control.correction[index, place, row, signal]
-                    memory[(known_varied + row) * STRIDE + slot] += factor * varied
+                memory[(at.known_varied + row) * STRIDE + slot] += factor * varied
 
 
 @scalar
@@ -408,7 +414,7 @@ def nearest_point(memory, slot, phase, control, index, scale, scene):
     least = math.inf
     for point in range(phase % repeats, points, repeats):
         distance = 0.0
-        for state in range(scale.shape[0]):
+        for state in range(control_rows(scene).states):
             value = memory[(known + state) * STRIDE + slot] - control.points[index, point, state]
             distance += (value / control.scales[index, state]) ** 2
         if distance < least:
@@ -424,7 +430,7 @@ def demanded(memory, slot, place, sources, target, control, scene):
     of what is kept; ``target``: 1 for the input, 0 for its variation, as the orbit does not vary.
     """
     (index, nearest), (known, kept) = place, sources
-    delay, states = control_rows(scene).delay, control.points.shape[2]
+    delay, states = control_rows(scene).delay, control_rows(scene).states
     total = 0.0
     for state in range(states):
         reference = target * control.points[index, nearest, state]
@@ -436,12 +442,13 @@ def demanded(memory, slot, place, sources, target, control, scene):
 
 
 @scalar
-def predict(memory, slot, index, nearest, chosen, control, scale, scene):
+def predict(memory, slot, index, nearest, chosen, control, scene):
     """Keep what the next period needs: the predicted estimate, or the states of the delay.
 
     ``chosen``: the input and its variation along the tangent vector.
     """
-    at, states, (effort, varied) = control_rows(scene), scale.shape[0], chosen
+    at, (effort, varied) = control_rows(scene), chosen
+    states = at.states
     for earlier in range(at.delay - 1, -1, -1):
         for state in range(states):
             row = earlier * states + state
@@ -455,16 +462,15 @@ def predict(memory, slot, index, nearest, chosen, control, scale, scene):
         for row in range(states):
             value = control.points[index, following, row]
             value += control.response[index, nearest, row] * effort
+            change = control.response[index, nearest, row] * varied
             for state in range(states):
                 factor = control.transition[index, nearest, row, state]
                 deviation = memory[(at.known + state) * STRIDE + slot]
                 value += factor * (deviation - control.points[index, nearest, state])
+                if scene.tangent is not None:
+                    change += factor * memory[(at.known_varied + state) * STRIDE + slot]
             memory[(at.kept + row) * STRIDE + slot] = value
             if scene.tangent is not None:
-                change = control.response[index, nearest, row] * varied
-                for state in range(states):
-                    factor = control.transition[index, nearest, row, state]
-                    change += factor * memory[(at.known_varied + state) * STRIDE + slot]
                 memory[(at.kept_varied + row) * STRIDE + slot] = change
 
 

@@ -1,5 +1,6 @@
 """Sweeps with [control]: what they capture, that their bits do not vary, and what is refused."""
 
+import signal
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from gearchaos.dynamics.control import PeriodMaps, lqr_gain, placed_gain
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.control import CAPTURED, NO_ORBIT, OFF
 
-from .commands import SMALL, run_module, same_data
+from .commands import SMALL, names_in, run_module, same_data, signalled
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 PUBLISHED = SWEEPS / "pan2021.toml"
@@ -242,11 +243,6 @@ def test_keys_of_a_missing_controller_cannot_be_swept():
         short().without_control().replace("sweep.parameter", "control.noise")
 
 
-def test_machines_without_an_actuator_are_refused():
-    with pytest.raises(ConfigurationError, match="this kind of machine has no input"):
-        gearchaos.load_config(SWEEPS / "two_masses.toml", ["control.limit=0.1"])
-
-
 def test_an_orbit_that_is_not_found_and_a_torque_that_is_missing_are_named():
     with pytest.raises(ConfigurationError, match=r"control.number = 9: 1 orbits of period 1"):
         gearchaos.run(short(control__number=9))
@@ -258,3 +254,22 @@ def test_fixing_the_swept_parameter_keeps_the_controller():
     fixed = short().at({"pitch_error": 12.6})
     assert fixed.control.found_at is None
     assert fixed.sweep.values == (12.6,)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_stopped_sweep_continues_with_the_same_bits(number, tmp_path):
+    """The controllers of the lanes are designed anew, and their noise begins anew."""
+    control = {"limit": 0.2, "found_at": 12.47, "noise": 1e-3, "seed": 5}
+    config = with_starts(700, control=control, integration__transient_periods=300)
+    (tmp_path / "pair.toml").write_text(config.resolved_toml())
+    words = ("pair.toml", "--threads", "1")
+    ended = signalled(tmp_path, "pair.h5.blocks", number, *words)
+    assert ended.code != 0
+    assert "Traceback" not in ended.err
+    assert names_in(tmp_path) == ["pair.h5.blocks", "pair.toml"]
+    done = run_module("gearchaos.sweep", *words, "--resume", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert run_module("gearchaos.sweep", *words, "-o", "one.h5", cwd=tmp_path).code == 0
+    one, resumed = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "pair.h5"))
+    assert same_data(one, resumed)
+    assert (one["effort_largest"] > 0.0).all()

@@ -130,11 +130,16 @@ class GearPairModel(Model):
         speed = None if config.pair is None else 60.0 / config.pair.teeth[0]
         return Scales(frequency, speed, length)
 
-    def torque(self, config: GearPairConfiguration, values: Mapping[str, Floats]) -> Floats | None:
-        """Return the torque on the driving gear, None where the load does not follow from it."""
-        if groups_at(config, values).origin["load"] != "derived":
+    def input_unit(
+        self, config: GearPairConfiguration, values: Mapping[str, Floats]
+    ) -> Floats | None:
+        """Return the torque on the driving gear for a load of 1, None if none determines it."""
+        groups = groups_at(config, values)
+        if groups.origin["load"] != "derived":
             return None
-        return np.asarray(physical_at(config, values)[TORQUE], dtype=np.float64)
+        torque = np.asarray(physical_at(config, values)[TORQUE], dtype=np.float64)
+        unit: Floats = np.abs(torque / groups.load)
+        return unit
 
     def remarks(
         self, config: GearPairConfiguration, system: LaneSystem, parameters: Mapping[str, Floats]

@@ -5,6 +5,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cache, cached_property
 from io import StringIO
+from itertools import product
 from types import MappingProxyType
 from typing import Any
 
@@ -17,9 +18,9 @@ from gearchaos.configuration.messages import Fault, declared_path
 from gearchaos.configuration.named_files import fault_of, text_beside
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.rules import GENERIC_RULES
-from gearchaos.configuration.tables import Parameter
+from gearchaos.configuration.tables import OF_CONTROLLERS, Parameter, swept_values
 from gearchaos.errors import GearchaosError
-from gearchaos.models.linear.machine import Kinds, Machine
+from gearchaos.models.linear.machine import Actuator, Kinds, Machine
 from gearchaos.models.linear.rules import RULES
 from gearchaos.models.linear.tables import (
     MATRICES,
@@ -54,6 +55,21 @@ class MachineConfiguration(Configuration):
     def machine(self, values: Mapping[str, float]) -> Machine:
         """Return the machine with these values of the swept parameters."""
 
+    @abstractmethod
+    def actuator_at(self, values: Mapping[str, float], name: str) -> Actuator:
+        """Return an actuator with these values of the swept parameters."""
+
+    def is_idle(self, actuator: str) -> bool:
+        """Whether an input is 0 for all values of the sweeps."""
+        if actuator not in self.actuators or not self.is_complete:
+            return False
+        ends = [swept_values(one)[[0, -1]].tolist() for one in self.sweeps.values()]
+        names = [one.parameter for one in self.sweeps.values()]
+        return not any(
+            self.actuator_at(dict(zip(names, values, strict=True)), actuator).steady
+            for values in product(*ends)
+        )
+
     @property
     def states(self) -> tuple[str, ...]:
         """States, each coordinate followed by its rate."""
@@ -66,6 +82,7 @@ class LinearConfiguration(MachineConfiguration):
 
     kind = "linear"
     rules = (*RULES, *GENERIC_RULES)
+    absolute_limit = "limit_force"
 
     model: MachineTable = key("the matrices of the machine")
     clearance: ClearanceTables = key("the clearance elements by name", default={})
@@ -100,7 +117,17 @@ class LinearConfiguration(MachineConfiguration):
         """The numbers that a sweep can vary, by their dotted path."""
         frequency = Parameter("frequency", "model.frequency", Range(gt=0), long_name="frequency")
         found = parameters_in(type(self), {"clearance": self.clearance, "force": self.force})
-        return MappingProxyType({"frequency": frequency, **found})
+        return MappingProxyType({"frequency": frequency, **found, **OF_CONTROLLERS})
+
+    @property
+    def actuators(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The forces, whose steady part a controller can change."""
+        return tuple(self.force)
+
+    def actuator_at(self, values: Mapping[str, float], name: str) -> Actuator:
+        """Return a force with these values of the swept parameters."""
+        force: Force = with_numbers({"force": self.force}, values)["force"][name]
+        return Actuator(force.on, force.mean)
 
     @cached_property
     def kinds_of_elements(self) -> Kinds:

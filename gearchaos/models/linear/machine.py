@@ -1,6 +1,6 @@
 """One piecewise-linear machine as matrices."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +54,21 @@ class Machine(NamedTuple):
         """K with all elements in contact at their mean stiffness, shape (n, n)."""
         held: Floats = self.stiffness + self.reaction @ (self.contact_stiffness[:, :1] * self.gap)
         return held
+
+
+class Actuator(NamedTuple):
+    """An input of a machine that a controller can change.
+
+    Attributes
+    ----------
+    row : mapping of str to float
+        Its force on each coordinate, for an input of 1.
+    steady : float
+        Its steady value.
+    """
+
+    row: Mapping[str, float]
+    steady: float
 
 
 class Kinds(NamedTuple):

@@ -9,7 +9,8 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, evaluate, jacobian
 from gearchaos_kernels.models.linear.system import LinearSystems
 
-from gearchaos.arrays import Array, Floats
+from gearchaos.arrays import Array, Floats, Integers
+from gearchaos.configuration.tables import OF_CONTROLLERS
 from gearchaos.models.linear.configuration import MachineConfiguration
 from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, TERMS, catalogue_of
@@ -44,12 +45,35 @@ class MachineModel(Model):
     ) -> LaneSystem:
         """Return the machines of some lanes."""
         del effects
-        given = {name: value for name, value in values.items() if name in config.parameters}
-        lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-        columns = np.stack([np.broadcast_to(value, lanes) for value in given.values()], axis=-1)
-        different, number = np.unique(columns.reshape(-1, len(given)), axis=0, return_inverse=True)
-        machines = [config.machine(dict(zip(given, row, strict=True))) for row in different]
-        return systems_of(machines, self._kinds).of(number.reshape(-1))
+        different, number = _different(config, values)
+        machines = [config.machine(one) for one in different]
+        return systems_of(machines, self._kinds).of(number)
+
+    def actuated(
+        self,
+        config: MachineConfiguration,
+        values: Mapping[str, Floats],
+        system: LaneSystem,
+        actuator: str,
+    ) -> LaneSystem:
+        """Return the machines of some lanes with an actuator."""
+        different, number = _different(config, values)
+        accelerations, steady = [], []
+        for one in different:
+            found, mass = config.actuator_at(one, actuator), config.machine(one).mass
+            force = [found.row.get(name, 0.0) for name in self._kinds.coordinates]
+            accelerations.append(np.linalg.solve(mass, np.array(force, dtype=np.float64)))
+            steady.append(found.steady)
+        return system.replace(
+            actuator=np.array(accelerations)[number], actuated=np.array(steady)[number]
+        )
+
+    def input_unit(
+        self, config: MachineConfiguration, values: Mapping[str, Floats]
+    ) -> Floats | None:
+        """Return 1: inputs are in the unit of the actuator."""
+        del config, values
+        return np.ones(())
 
     def elements(self, effects: Collection[str]) -> tuple[str, ...]:
         """Return the names of the clearance elements."""
@@ -93,6 +117,24 @@ class MachineModel(Model):
             motion[f"{FORCE}{name}"] = found.forces[:, :, number].copy()
             motion[f"contact_{name}"] = found.contact[:, :, number].copy()
         return motion
+
+
+def _different(
+    config: MachineConfiguration, values: Mapping[str, Floats]
+) -> tuple[list[dict[str, float]], Integers]:
+    """Return the different values of the machine's parameters, and the number of each lane's."""
+    given = {
+        name: value
+        for name, value in values.items()
+        if name in config.parameters and name not in OF_CONTROLLERS
+    }
+    lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
+    if not given:
+        return [{}], np.zeros(lanes, dtype=np.intp).reshape(-1)
+    columns = np.stack([np.broadcast_to(value, lanes) for value in given.values()], axis=-1)
+    different, number = np.unique(columns.reshape(-1, len(given)), axis=0, return_inverse=True)
+    rows = [dict(zip(given, row.tolist(), strict=True)) for row in different]
+    return rows, number.reshape(-1)
 
 
 def _growing(system: LaneSystem) -> str:

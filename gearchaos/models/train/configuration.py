@@ -10,9 +10,9 @@ from typing import Any
 from gearchaos.configuration.keys import key
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.rules import GENERIC_RULES, Rules
-from gearchaos.configuration.tables import Parameter
+from gearchaos.configuration.tables import OF_CONTROLLERS, Parameter
 from gearchaos.models.linear.configuration import MachineConfiguration, parameters_in
-from gearchaos.models.linear.machine import Kinds, Machine, without_drift
+from gearchaos.models.linear.machine import Actuator, Kinds, Machine, without_drift
 from gearchaos.models.linear.rules import add_rules_of_machines
 from gearchaos.models.linear.values import with_numbers
 from gearchaos.models.stiffness_table import IN_N_PER_UM, with_stiffness_files
@@ -73,7 +73,24 @@ class TrainConfiguration(MachineConfiguration):
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
         """The numbers that a sweep can vary, by their dotted path."""
         tables = {name: getattr(self, name) for name in PARTS}
-        return MappingProxyType(parameters_in(type(self), tables))
+        return MappingProxyType(parameters_in(type(self), tables) | dict(OF_CONTROLLERS))
+
+    @property
+    def actuators(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The shafts that can turn, or the loaded member, whose torque a controller can change."""
+        if self.planetary is not None:
+            return (self.planetary.loaded,)
+        return tuple(name for name, one in self.shaft.items() if not one.uniform)
+
+    def actuator_at(self, values: Mapping[str, float], name: str) -> Actuator:
+        """Return the torque of a shaft or member in N m with these values of the parameters."""
+        tables = with_numbers({"shaft": self.shaft, "planetary": self.planetary}, values)
+        if self.planetary is None:
+            return Actuator({f"{name}_angle": shafts.TORQUE}, tables["shaft"][name].torque_Nm)
+        given = tables["planetary"]
+        return Actuator(
+            {f"{name}_u": planetary.force_of_torque(given, name)}, planetary.torques(given)[name]
+        )
 
     @property
     def is_complete(self) -> bool:

@@ -24,6 +24,7 @@ class TrainModel(MachineModel):
             Quantity.ANGULAR_SPEED: "mrad/ms",
             Quantity.ANGULAR_ACCELERATION: "mrad/ms^2",
             Quantity.FORCE: "N",
+            Quantity.TORQUE: "N m",
             Quantity.GROWTH_RATE: "ms^-1",
             Quantity.TIME: "ms",
         }

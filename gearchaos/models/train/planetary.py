@@ -55,6 +55,11 @@ def radii(given: Planetary) -> dict[str, float]:
     }
 
 
+def force_of_torque(given: Planetary, member: str) -> float:
+    """Return the force in N along the rotation of a member by a torque of 1 N m on it."""
+    return 1e3 / radii(given)[member]
+
+
 def assembled(given: Planetary, effects: Collection[str], *, free: bool = False) -> Assembly:
     """Return the parts of a planetary set.
 

@@ -271,7 +271,5 @@ numbers_of_elements = numbers_of(lambda scene: provider_of(scene.model).elements
 
 @scalar
 def read_varied_input(memory, slot, scene):
-    """Return the variation of the steady input along the tangent vector, None without control."""
-    if scene.control is None:
-        return None
+    """Return the variation of the steady input along the tangent vector."""
     return memory[control_rows(scene).varied * STRIDE + slot]

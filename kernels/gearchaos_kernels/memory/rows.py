@@ -121,6 +121,8 @@ class ControlRows(NamedTuple):
         The row after the last one.
     delay : int
         Mesh periods of a delayed feedback.
+    states : int
+        Number of states: a constant, so that loops over it are unrolled.
     """
 
     varied: int
@@ -130,6 +132,7 @@ class ControlRows(NamedTuple):
     kept_varied: int
     end: int
     delay: int
+    states: int
 
 
 def control_rows_of(scene: Scene) -> ControlRows:
@@ -145,6 +148,7 @@ def control_rows_of(scene: Scene) -> ControlRows:
         kept_varied=last + kept,
         end=last + 2 * kept,
         delay=scene.feedback.delay,
+        states=states,
     )
 
 

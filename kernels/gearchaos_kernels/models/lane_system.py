@@ -285,6 +285,20 @@ class LaneSystem(ABC):
         value: Floats = getattr(self, provider_of(self.flags()).actuated)
         return value
 
+    def input_strength(self, step: Floats) -> Floats:
+        """Return the change of the coefficient `Model.actuated` by an input of 1, shape (lanes,).
+
+        ``step``: length of a step in units of tau, shape (lanes,).
+        """
+        model = provider_of(self.flags())
+        column = model.lane._fields.index(model.actuated)
+        one, none = (
+            self.with_steady_input(np.full(self.lanes, value)).coefficients(step)[:, column]
+            for value in (1.0, 0.0)
+        )
+        strength: Floats = one - none
+        return strength
+
     # Flow maps use all of the following.
 
     def refuses_maps(self) -> str:

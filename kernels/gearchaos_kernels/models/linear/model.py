@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -112,7 +113,14 @@ def _of_coordinates(flags: Linear) -> Terms:
     return _rows(structure, ("gap",), structure.elements, (structure.coordinates,))
 
 
-_forces = _of_waves("force", "coordinates")
+def _of_forces(flags: Linear) -> Terms:
+    """Return the terms of the forces; the input of a controller follows the waves."""
+    structure = flags.structure
+    widths = (1 + structure.waves, 1)
+    return _rows(structure, ("force", "actuator"), structure.coordinates, widths)
+
+
+_forces = sums(_of_forces)
 _stiffnesses = _of_waves("stiffness", "elements")
 _motions = _of_waves("motion", "elements")
 _motion_rates = _of_waves("motion_rate", "elements")
@@ -162,6 +170,27 @@ def _speed_of(_typing_context: Any, lane: Any, scene: Any) -> Any:
     return types.float64(lane, scene), generate
 
 
+def _input_or(otherwise: float) -> Any:
+    """Return an intrinsic that returns the controller's input to a lane, or a constant."""
+
+    @intrinsic
+    def input_of(_typing_context: Any, lane: Any, scene: Any) -> Any:
+        structure = scene.scene.model.structure
+
+        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            if not structure.actuator:
+                return ir.Constant(ir.DoubleType(), otherwise)
+            return builder.extract_value(arguments[0], places_of(structure).input)
+
+        return types.float64(lane, scene), generate
+
+    return input_of
+
+
+_added = _input_or(0.0)
+_first_input = _input_or(1.0)
+
+
 @scalar
 def grid_at(table, row, scene):
     """Return the waves at a row of the grid of half steps, a tuple."""
@@ -178,7 +207,7 @@ def point_within(memory, slot, table, number, fraction, scene):
 def forcing_at(lane, point, scene):
     """Return what acts on a lane at these values of the waves."""
     return Forcing(
-        _forces(lane, scene, 1.0, point),
+        _forces(lane, scene, 1.0, point, _added(lane, scene)),
         _stiffnesses(lane, scene, 1.0, point),
         _motions(lane, scene, 1.0, point),
         _motion_rates(lane, scene, 1.0, point),
@@ -199,9 +228,15 @@ def _no_waves(_typing_context: Any, scene: Any) -> Any:
 @scalar
 def unforced(lane, scene):
     """Return what acts without excitation, with the mean stiffness of every element."""
+    return driven(lane, 0.0, scene)
+
+
+@scalar
+def driven(lane, drive, scene):
+    """Return what acts without excitation by this input of a controller."""
     nothing = _no_waves(scene)
     return Forcing(
-        _forces(lane, scene, 0.0, nothing),
+        _forces(lane, scene, 0.0, nothing, drive),
         _stiffnesses(lane, scene, 1.0, nothing),
         _motions(lane, scene, 0.0, nothing),
         _motion_rates(lane, scene, 0.0, nothing),
@@ -271,27 +306,57 @@ def _value_of(gap):
     return gap.value
 
 
+@intrinsic
+def _moving(_typing_context: Any, waves: Any, scene: Any) -> Any:
+    """Return the waves without the constant one that follows them if there is an actuator."""
+    count = scene.scene.model.structure.waves
+    returned = types.UniTuple(types.float64, count)
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        numbers = [builder.extract_value(arguments[0], at) for at in range(count)]
+        return context.make_tuple(builder, returned, numbers)
+
+    return returned(waves, scene), generate
+
+
+@intrinsic
+def _constant_or(_typing_context: Any, waves: Any, otherwise: Any, scene: Any) -> Any:
+    """Return the value of the constant wave, or another number if there is no actuator."""
+    structure = scene.scene.model.structure
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        if not structure.actuator:
+            return arguments[1]
+        return builder.extract_value(arguments[0], structure.waves)
+
+    return types.float64(waves, types.float64, scene), generate
+
+
 @scalar
 def unit_forcing(lane, drive, waves, scene):
-    """Return what acts on a lane by a share of its steady forces and by these values of waves."""
+    """Return what acts on a lane by a drive and by these values of waves.
+
+    The drive is the share of the steady forces, or the input of the actuator if there is one.
+    """
+    steady, moving = _constant_or(waves, drive, scene), _moving(waves, scene)
     return Forcing(
-        _forces(lane, scene, drive, waves),
+        _forces(lane, scene, steady, moving, drive),
         _stiffnesses(lane, scene, 1.0, _no_waves(scene)),
-        _motions(lane, scene, 0.0, waves),
-        _motion_rates(lane, scene, 0.0, waves),
+        _motions(lane, scene, 0.0, moving),
+        _motion_rates(lane, scene, 0.0, moving),
     )
 
 
 @scalar
 def point_of_waves(waves, scene):
-    """Return the waves themselves."""
-    return waves
+    """Return the waves themselves, without the constant one."""
+    return _moving(waves, scene)
 
 
 @scalar
 def inputs_of(lane, scene):
     """Return the inputs: the maps of a lane already contain its forces and waves."""
-    return 1.0, 1.0
+    return _first_input(lane, scene), 1.0
 
 
 @scalar
@@ -300,9 +365,17 @@ def mean_gaps(lane, scene):
     return _motions(lane, scene, 1.0, _no_waves(scene))
 
 
+def _map_waves(structure: Structure) -> int:
+    """Return the number of waves of flow maps.
+
+    With an actuator, which is then the drive, the steady forces are those of a constant wave.
+    """
+    return structure.waves + (1 if structure.actuator else 0)
+
+
 def _inputs(flags: Linear) -> NDArray[Any]:
-    """Return the inputs of the maps: the steady forces, and all waves."""
-    functions = 1 + flags.structure.waves
+    """Return the inputs of the maps: the steady forces or the actuator, and all waves."""
+    functions = 1 + _map_waves(flags.structure)
     inputs = np.zeros((2, functions, functions))
     inputs[0, 0, 0] = 1.0
     for wave in range(1, functions):
@@ -313,7 +386,7 @@ def _inputs(flags: Linear) -> NDArray[Any]:
 def _stiffness_parts(flags: Linear, coefficients: Floats) -> Floats:
     """Return the stiffness of every element as parts of the waves; see `Model.stiffness`."""
     structure = flags.structure
-    parts = np.zeros((len(coefficients), structure.elements, 2 + structure.waves))
+    parts = np.zeros((len(coefficients), structure.elements, 2 + _map_waves(structure)))
     for coefficient, element, wave in numbered(structure, "stiffness"):
         # No variation is shared.
         parts[:, element, wave + 1 if wave else 0] = coefficients[:, coefficient]
@@ -330,9 +403,10 @@ def _kinds(flags: Linear) -> tuple[ElementKind, ...]:
 def model_of(flags: Linear) -> Model:
     """Return the model of systems of one structure."""
     structure = flags.structure
+    lane = _numbered_type("Coefficients", places_of(structure).total)
     return Model(
         coordinates=coordinates_of(structure),
-        lane=_numbered_type("Coefficients", places_of(structure).total),
+        lane=lane,
         elements=lambda flags: flags.structure.elements,
         kinds=_kinds,
         observed=tuple(f"gap_{number}" for number in range(structure.elements)),
@@ -341,6 +415,8 @@ def model_of(flags: Linear) -> Model:
         point_within=point_within,
         forcing_at=forcing_at,
         unforced=unforced,
+        driven=driven,
+        actuated=lane._fields[places_of(structure).input] if structure.actuator else "",
         elements_at=elements_at,
         half_clearances=half_clearances,
         gap_speeds=gap_speeds,
@@ -348,7 +424,7 @@ def model_of(flags: Linear) -> Model:
         accelerations=accelerations,
         observed_at=observed_at,
         maps=MapFormulas(
-            waves=tuple(f"wave_{number}" for number in range(structure.waves)),
+            waves=tuple(f"wave_{number}" for number in range(_map_waves(structure))),
             inputs=_inputs,
             stiffness_parts=_stiffness_parts,
             point_of_waves=point_of_waves,

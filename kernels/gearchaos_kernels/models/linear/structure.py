@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,8 @@ class Structure:
         k_j, (element, wave).
     one_sided, damped_in_contact : tuple of bool
         See `ElementKind`.
+    actuator : tuple of entries
+        The direction of a controller's input, (coordinate, 0); none without a controller.
     """
 
     coordinates: int
@@ -77,12 +79,18 @@ class Structure:
     stiffness: Entries
     one_sided: tuple[bool, ...]
     damped_in_contact: tuple[bool, ...]
+    actuator: Entries = ()
 
     @cached_property
     def indices(self) -> dict[str, tuple[list[int], list[int]]]:
         """Rows and columns of the entries of every matrix, by its name."""
         places = {name: np.array(getattr(self, name)).reshape(-1, 2) for name in MATRICES}
         return {name: (at[:, 0].tolist(), at[:, 1].tolist()) for name, at in places.items()}
+
+    @property
+    def terms(self) -> dict[str, Any]:
+        """The fields by their names."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def waves(self) -> int:
@@ -104,6 +112,7 @@ MATRICES = (
     "motion",
     "motion_rate",
     "stiffness",
+    "actuator",
 )
 """The sparse matrices of a lane, in the order of its coefficients."""
 
@@ -117,6 +126,8 @@ class Places(NamedTuple):
         Damping and half clearance of each element.
     speed : int
         Steps per unit of tau.
+    input : int
+        What a controller adds along the actuator; only systems with one have this coefficient.
     total : int
         Number of coefficients.
     """
@@ -124,6 +135,7 @@ class Places(NamedTuple):
     damping: int
     half_clearance: int
     speed: int
+    input: int
     total: int
 
 
@@ -131,7 +143,8 @@ def places_of(structure: Structure) -> Places:
     """Return where the coefficients of a lane are that belong to no matrix."""
     first = sum(len(getattr(structure, name)) for name in MATRICES)
     after = first + 2 * structure.elements
-    return Places(first, first + structure.elements, after, after + 1)
+    total = after + (2 if structure.actuator else 1)
+    return Places(first, first + structure.elements, after, after + 1, total)
 
 
 def numbered(structure: Structure, name: str) -> Iterator[tuple[int, int, int]]:

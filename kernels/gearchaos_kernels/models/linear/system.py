@@ -1,8 +1,9 @@
 """A batch of piecewise-linear systems: their matrices, and what the engine derives from them."""
 
+import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from gearchaos_kernels.models.linear.structure import (
 from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
 from gearchaos_kernels.models.waves import waves_of
 from gearchaos_kernels.plan import Floats
+
+if TYPE_CHECKING:
+    from gearchaos_kernels.control import Control
 
 MOST_MAPPED = 52
 """Largest number of clearance elements of a system that flow maps integrate.
@@ -55,6 +59,11 @@ class LinearSystems(LaneSystem):
         See `ElementKind`.
     names : tuple of str
         Names of the coordinates; by default x0, x1 and so on.
+    actuator : array, shape (lanes, n), optional
+        Accelerations by an input of 1 that a controller adds. Without a controller it has no
+        effect.
+    actuated : array, shape (lanes,), optional
+        The steady input along the actuator, which ``force`` already contains.
 
     Examples
     --------
@@ -84,6 +93,8 @@ class LinearSystems(LaneSystem):
     one_sided: tuple[bool, ...] = ()
     damped_in_contact: tuple[bool, ...] = ()
     names: tuple[str, ...] = ()
+    actuator: Floats | None = None
+    actuated: Floats | None = None
 
     @property
     def mesh_period(self) -> Floats:
@@ -132,16 +143,21 @@ class LinearSystems(LaneSystem):
             "stiffness": twice,
         }
         columns = []
+        added = [np.zeros_like(once)] if self.structure.actuator else []
         for name in MATRICES:
             rows, entries = self.structure.indices[name]
             factor = np.asarray(factors.get(name, 1.0))
             columns.append(self._matrix(name)[:, rows, entries] * factor)
         return np.concatenate(
-            [*columns, self.damping * once, self.half_clearance, 1.0 / once], axis=1
+            [*columns, self.damping * once, self.half_clearance, 1.0 / once, *added], axis=1
         )
 
     def _matrix(self, name: str) -> Floats:
         """Return the matrix of every lane, shape (lanes, rows, columns)."""
+        if name == "actuator":
+            # Without a controller the scene is that of a system without an actuator.
+            none = self.control is None or self.actuator is None
+            return np.zeros((self.lanes, self.gap.shape[2], 1)) if none else self._direction
         if name != "motion_rate":
             matrix: Floats = getattr(self, name)
             return matrix
@@ -150,6 +166,27 @@ class LinearSystems(LaneSystem):
         rates[..., 1::2] = speeds * self.motion[..., 2::2]
         rates[..., 2::2] = -speeds * self.motion[..., 1::2]
         return rates
+
+    @property
+    def _direction(self) -> Floats:
+        """The actuator as a matrix, shape (lanes, n, 1)."""
+        assert self.actuator is not None
+        return self.actuator[:, :, np.newaxis]
+
+    @property
+    def steady_input(self) -> Floats:
+        """The steady input of every lane, shape (lanes,); 0 without an actuator."""
+        return np.zeros(self.lanes) if self.actuated is None else self.actuated
+
+    def with_steady_input(self, values: Floats) -> Self:
+        """Return the systems with other steady inputs, shape (lanes,), along the actuator."""
+        force = self.force.copy()
+        force[:, :, :1] += self._direction * (values - self.steady_input)[:, np.newaxis, np.newaxis]
+        return self.replace(force=force, actuated=values)
+
+    def input_strength(self, step: Floats) -> Floats:
+        """Return the change of the coefficient that is the input, by an input of 1, (lanes,)."""
+        return step**2
 
     def growth_rates(self) -> Floats:
         """Return a bound on the rate of tangent vectors: of the stiffest branch, and of damping."""
@@ -201,12 +238,21 @@ class LinearSystems(LaneSystem):
         """Return the systems of some lanes, in the given order."""
         return self._alike(super().of(chosen))
 
+    def controlled(self, control: "Control | None") -> Self:
+        """Return the systems with controllers, whose input acts along the actuator."""
+        return self._alike(super().controlled(control))
+
     def _alike(self, other: Self) -> Self:
         """Return systems with the structure of these, though some terms of theirs may be zero.
 
-        Compiled code, and the order of coefficients, belong to a structure.
+        Compiled code, and the order of coefficients, belong to a structure. The actuator belongs to
+        it only with a controller.
         """
-        vars(other)["structure"] = self.structure
+        structure = self.structure
+        if (other.control is None) != (self.control is None):
+            actuator = entries_of(other._matrix("actuator"))
+            structure = structure_of(**structure.terms | {"actuator": actuator})
+        vars(other)["structure"] = structure
         return other
 
     def of_unit_inputs(self) -> Self:
@@ -215,21 +261,33 @@ class LinearSystems(LaneSystem):
 
     def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        names = [name for name in self._parameters() if name != "half_clearance"]
-        return np.concatenate(
-            [getattr(self, name).reshape(self.lanes, -1) for name in names], axis=1
-        )
+        without = {
+            "half_clearance",
+            "actuated",
+            *(() if self.structure.actuator else ("actuator",)),
+        }
+        names = [name for name in self._parameters() if name not in without]
+        numbers = [getattr(self, name) for name in names]
+        # A size of -1 is unknown where there are no lanes.
+        flat = [one.reshape(self.lanes, math.prod(one.shape[1:])) for one in numbers]
+        return np.concatenate(flat, axis=1)
 
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
         return self.orders
 
     def wave_series(self, steps: int, terms: int) -> Floats:
-        """Return Taylor coefficients of a stiffness variation, which is 0, and of the waves."""
+        """Return Taylor coefficients of a stiffness variation, which is 0, and of the waves.
+
+        With an actuator, a constant wave follows, which is that of the steady forces.
+        """
         series = [np.zeros((terms, steps))]
         for order in self.orders:
             wave = harmonic_series(order, steps, terms)
             series += [wave.real, wave.imag]
+        if self.structure.actuator:
+            series.append(np.zeros((terms, steps)))
+            series[-1][0] = 1.0
         return np.stack(series)
 
     def harmonics(self) -> int:
@@ -238,7 +296,8 @@ class LinearSystems(LaneSystem):
 
     def wave_values(self, phase: Floats) -> Floats:
         """Return the waves at mesh phases in rad, shape (phases, waves)."""
-        return waves_of(self.orders, phase)
+        constant = np.ones((phase.size, 1 if self.structure.actuator else 0))
+        return np.concatenate([waves_of(self.orders, phase), constant], axis=1)
 
     def _parameters(self) -> list[str]:
         """Return the names of the fields that are arrays over the lanes."""
