@@ -271,5 +271,7 @@ numbers_of_elements = numbers_of(lambda scene: provider_of(scene.model).elements
 
 @scalar
 def read_varied_input(memory, slot, scene):
-    """Return the variation of the steady input along the tangent vector."""
+    """Return the variation of the steady input along the tangent vector, None without control."""
+    if scene.control is None:
+        return None
     return memory[control_rows(scene).varied * STRIDE + slot]

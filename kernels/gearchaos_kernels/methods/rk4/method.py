@@ -113,9 +113,7 @@ def step(memory, lanes, at, given, scene):
             tangent = read_state(memory, rows(scene).tangent, slot, scene)
             if scene.resolved is not None:
                 write_state(memory, rows(scene).tangent_before, slot, tangent, scene)
-            varied = None
-            if scene.control is not None:
-                varied = read_varied_input(memory, slot, scene)
+            varied = read_varied_input(memory, slot, scene)
             tangent, _ = rk4.advance(rk4.tangent_stage, tangent, 1.0, lane, pushes, varied, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
     if scene.switches is not None:

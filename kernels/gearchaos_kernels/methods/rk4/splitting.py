@@ -59,9 +59,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
     branches = read_branches(memory, slot, scene)
-    varied = None
-    if scene.control is not None:
-        varied = read_varied_input(memory, slot, scene)
+    varied = read_varied_input(memory, slot, scene)
     crossings = 0
     while True:
         left = until - done
