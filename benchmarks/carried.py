@@ -2,7 +2,7 @@
 
     python benchmarks/carried.py [--rounds 3] [--output carried.json]
 
-The same lanes, with tangent vector and labels, once free and once as so many carried sweeps side by
+The same lanes, with tangent vector and labels, once free and once as carried sweeps side by
 side: the lines of a second parameter, half as many in both directions. Rounds visit every number of
 sweeps in turn; times are medians, ratios medians of the ratios to the free lanes of that round.
 """
@@ -51,8 +51,8 @@ def main() -> None:
     for sweeps in SWEEPS:
         carried, free = lanes[sweeps, "both"], lanes[sweeps, "none"]
         ratio = statistics.median(a / b for a, b in zip(carried, free, strict=True))
-        told = statistics.median(carried), statistics.median(free)
-        print(f"{sweeps:8d}{told[0]:18.1f}{told[1]:15.1f}{ratio:8.2f}")
+        medians = statistics.median(carried), statistics.median(free)
+        print(f"{sweeps:8d}{medians[0]:18.1f}{medians[1]:15.1f}{ratio:8.2f}")
     if options.output is not None:
         rows = [{"sweeps": s, "carry": c, "lanes_per_second": r} for (s, c), r in lanes.items()]
         facts = {"machine": machine_facts(), "steps": STEPS, "rates": rows}

@@ -6,8 +6,8 @@ Lanes of Pan 2021 that cross clearance boundaries, from rest; the error is the l
 state after 20 mesh periods, in the median lane, against 25,600 resolved steps per period, which
 share nothing with flow maps. For each wanted error the coarsest of the tried grids that reaches it
 is timed, plain, resolved and 24 flow maps in turn, on one thread, in processor time, over as many
-periods as are asked for: of a sweep over 1000, a call as such is no part worth naming. Flow maps
-are made before; what that takes is told apart.
+periods as --periods sets: of a sweep over 1000, a call as such is no part worth naming. Flow maps
+are made before; the time for that is printed apart.
 """
 
 import argparse

@@ -5,7 +5,7 @@
 The same sweep is computed into a store of blocks by each executor with each size of blocks. All
 executors have the same cores: one worker has all threads, two have half of them each. Rounds visit
 every contestant in turn; times are medians, ratios medians of the ratios within a round to the
-fastest size of blocks in this process. Starting the workers is not counted, and told apart.
+fastest size of blocks in this process. Starting the workers is not counted, but printed apart.
 """
 
 import argparse
@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def seconds_of(simulation: RunPlan, executor: BlockExecutor, size: int) -> float:
-    """Compute the sweep in blocks of so many lanes, to the last block on the disk."""
+    """Compute the sweep in blocks of `size` lanes, to the last block on the disk."""
     with tempfile.TemporaryDirectory() as folder:
         output = str(Path(folder) / "sweep.h5")
         with open_store(simulation, output, resume=False) as store:

@@ -1,11 +1,12 @@
-"""Do the errors that a sweep tells of its exponents bound the true ones?
+"""Do the errors that a sweep reports for its exponents bound the true ones?
 
     python benchmarks/exponents.py [--output exponents]
 
 Bound: on some lanes of several sweeps, at several numbers of steps, the exponent is compared with a
 better one: that of the polished orbit at 3200 steps where the lane is periodic on both grids, or
 else the mean over a record twenty times as long at the steps of the sweep, where its own standard
-error is below a third of what is judged. Told is twice the sum of step error and standard error.
+error is below a third of what is judged. The error reported is twice the sum of step error and
+standard error.
 
 Coverage: 200 random starts of chaotic lanes, 500 periods each, against their common mean.
 """
@@ -72,7 +73,7 @@ def main() -> None:
 
 
 def bounded(file: str, overrides: list[str], steps: int) -> dict[str, float]:
-    """Count the lanes whose error is bounded by twice what is told of it."""
+    """Count the lanes whose error is bounded by twice the error that is reported."""
     config = gearchaos.load_config(
         SWEEPS / f"{file}.toml",
         [

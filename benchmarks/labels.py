@@ -2,8 +2,8 @@
 
     python benchmarks/labels.py [--sets unseen] [--output labels]
 
-Lanes of several sweeps are labelled as a sweep does it, and their motion is told in another way:
-each goes on from where it ended, ten times as long and for 20,000 periods at least, with twice as
+Lanes of several sweeps are labelled as a sweep does it, and their motion is identified differently:
+each continues from where it ended, ten times as long and for 20,000 periods at least, with twice as
 many steps per period.
 It is periodic if Newton's method closes an orbit where it ends whose Floquet multipliers lie inside
 the unit circle; chaotic if the plain mean growth over the later half of the long run exceeds five
@@ -44,8 +44,8 @@ RECURRING = (1e-7, 1e-3)
 SMALLEST_GROWTH = 3e-4
 ARRIVED = 0.02
 KINDS = ("periodic", "quasi_periodic", "chaotic")
-LONG_PERIOD, LATER, NOT_TOLD = "period > 16", "arrives later", "not told"
-ROWS = (*KINDS, LONG_PERIOD, LATER, NOT_TOLD)
+LONG_PERIOD, LATER, NOT_IDENTIFIED = "period > 16", "arrives later", "not identified"
+ROWS = (*KINDS, LONG_PERIOD, LATER, NOT_IDENTIFIED)
 
 PAIR = {
     "mesh_frequency": 0.8758760318208343,
@@ -59,7 +59,7 @@ PAIR = {
     "transverse_stiffness_g": 6.3545,
     "transverse_damping_g": 0.0058386,
 }
-"""Groups of all sets, but for those that a set names."""
+"""Groups of all sets, except for those that a set names."""
 
 TORSION = 'scene.effects=["pitch_error", "stiffness_variation", "backlash"]'
 
@@ -261,7 +261,7 @@ class Judged(NamedTuple):
 
 
 def main() -> None:
-    """Label, tell in another way, print the confusion matrices, write JSON."""
+    """Label, identify the motions differently, print the confusion matrices, write JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sets", choices=SETS, action="append", help="which (default: all)")
     parser.add_argument("--output", type=Path, default=Path("labels"))
@@ -287,8 +287,8 @@ def scored(sets: dict[str, Lanes]) -> dict:
     _print(matrix)
     scores = {
         kind: {
-            "lasting": f1(whole, kind, without=(LATER, NOT_TOLD)),
-            "with_those_that_arrive_later": f1(whole, kind, without=(NOT_TOLD,)),
+            "lasting": f1(whole, kind, without=(LATER, NOT_IDENTIFIED)),
+            "with_those_that_arrive_later": f1(whole, kind, without=(NOT_IDENTIFIED,)),
         }
         for kind in KINDS
     }
@@ -314,13 +314,13 @@ def scored(sets: dict[str, Lanes]) -> dict:
 
 
 def judged(config: gearchaos.Configuration) -> Judged:
-    """Label the lanes of a sweep and tell their motion in another way."""
+    """Label the lanes of a sweep, and identify their motion differently."""
     began = time.perf_counter()
     result = gearchaos.run(config)
     seconds = time.perf_counter() - began
     steps = FINER * config.integration.steps_per_period
     simulation = plan_run(config.replace("integration.steps_per_period", steps))
-    truths, true_periods = told(simulation, result["end_state"])
+    truths, true_periods = motions_of(simulation, result["end_state"])
     return Judged(
         result[result.axis],
         np.array(MOTION_MEANINGS)[result["motion"]],
@@ -331,8 +331,8 @@ def judged(config: gearchaos.Configuration) -> Judged:
     )
 
 
-def told(simulation: RunPlan, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tell the motion of every lane from a long run at fine steps."""
+def motions_of(simulation: RunPlan, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Identify the motion of every lane from a long run at fine steps."""
     numbers = np.arange(len(simulation.lanes))
     system, recorded = simulation.lanes.system_of(numbers), simulation.plan.recorded_periods
     periods = LONGER * (simulation.plan.transient_periods + recorded)
@@ -350,7 +350,7 @@ def told(simulation: RunPlan, start: np.ndarray) -> tuple[np.ndarray, np.ndarray
         period, stable = np.where(found, nearly, period), stable | found
     growth, error = _growth(outcome.growth[:, -plan.recorded_periods // 2 :])
     arrived = _distance(start, outcome.section[:, -LONGEST:]) < ARRIVED
-    truths = np.full(numbers.size, NOT_TOLD, dtype="U20")
+    truths = np.full(numbers.size, NOT_IDENTIFIED, dtype="U20")
     for lane in numbers:
         if stable[lane]:
             truths[lane] = "periodic" if period[lane] <= 16 else LONG_PERIOD
@@ -429,7 +429,7 @@ def confusion(lanes: Judged) -> dict[str, dict[str, int]]:
 def f1(lanes: Judged, kind: str, without: tuple[str, ...]) -> float:
     """Return the F1 score of one kind of motion; an unresolved lane counts as missed."""
     judged_lanes = ~np.isin(lanes.truths, without)
-    # What arrives later is periodic in the end.
+    # Lanes that arrive later are periodic in the end.
     truths = np.where(lanes.truths == LATER, "periodic", lanes.truths)
     true, labelled = truths[judged_lanes] == kind, lanes.labels[judged_lanes] == kind
     return float(2 * np.sum(true & labelled) / (np.sum(true) + np.sum(labelled)))
@@ -443,7 +443,7 @@ def disagreements(sets: dict[str, Judged]) -> list[str]:
         other = (lanes.labels != wanted) | (
             (lanes.labels == "periodic") & (lanes.periods != lanes.true_periods)
         )
-        for lane in np.flatnonzero(other & ~np.isin(lanes.truths, (LATER, NOT_TOLD))):
+        for lane in np.flatnonzero(other & ~np.isin(lanes.truths, (LATER, NOT_IDENTIFIED))):
             label, truth = lanes.labels[lane], lanes.truths[lane]
             lines.append(
                 f"{name}, {lanes.values[lane]:.6g}: labelled {label} {lanes.periods[lane] or ''}, "

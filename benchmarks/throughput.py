@@ -83,7 +83,7 @@ def engine(
     method: str = "rk4",
     **groups: float,
 ) -> Callable[[], int]:
-    """Return work that integrates the sweep of Pan 2021 and tells how many steps that took.
+    """Return work that integrates the sweep of Pan 2021 and returns how many steps that took.
 
     Steps of RK4: flow maps count for `STEPS` a period. ``groups``: groups of all lanes to replace.
     """

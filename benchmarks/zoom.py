@@ -1,7 +1,7 @@
 """How long is it from a zoom to the new picture in `explore`, and does it grow with the points?
 
 Ten thousand, a hundred thousand and a million section points of the pair of Pan 2021 are opened in
-a headless Chromium, and a box is drawn into the diagram. Told are medians: of the time from the
+a headless Chromium, and a box is drawn into the diagram. It prints medians: of the time from the
 moment at which the mouse is let go to the one at which the picture has come (0.1 s of it
 HoloViews waits for another movement), of the processor time of the server, the pointer's way
 included, and of the bytes that were sent. Needs gearchaos[explore], playwright and chromium.

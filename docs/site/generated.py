@@ -15,7 +15,7 @@ from pathlib import Path
 CLONE = Path(__file__).resolve().parents[2]
 SUBJECTS = {"STATE": "STATE", "ACCELERATION": "COORDINATE_acceleration"}
 SUBJECTS |= {"ELEMENT": "ELEMENT", "SIGNAL": "SIGNAL"}
-"""What takes the place of a name in an output that exists once for each state, and so on."""
+"""Placeholders of a name in an output that exists once for each state, and so on."""
 
 
 def command_page() -> str:
@@ -123,7 +123,7 @@ def python_page() -> str:
     tables = gearchaos.Result.to_dataframe, gearchaos.Result.to_xarray
     homes = {
         "gearchaos": [getattr(gearchaos, name) for name in gearchaos.__all__],
-        "What systems and results return": [*returned, Variable, *tables],
+        "Types that systems and results return": [*returned, Variable, *tables],
         "gearchaos.figures": vars(figures).values(),
         "gearchaos.iso1328": vars(iso1328).values(),
         "gearchaos.errors": vars(errors).values(),

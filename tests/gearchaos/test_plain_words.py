@@ -1,6 +1,7 @@
-"""Comments, docstrings and messages of the package use plain words."""
+"""Comments, docstrings and messages of the package, and the manual, use plain words."""
 
 import io
+import json
 import re
 import tokenize
 from collections.abc import Iterator
@@ -12,10 +13,11 @@ import pytest
 CLONE = Path(__file__).resolve().parents[2]
 SOURCES = [
     path
-    for folder in ("gearchaos", "kernels")
+    for folder in ("gearchaos", "kernels", "docs", "benchmarks", "sweeps")
     for path in sorted((CLONE / folder).rglob("*"))
-    if path.suffix in (".py", ".md")
+    if path.suffix in (".py", ".md", ".ipynb", ".toml")
 ]
+SOURCES += [CLONE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
 
 PLAIN = {
     r"\btells?\b|\btold\b": "reports, prints, returns, warns",
@@ -40,7 +42,10 @@ PLAIN = {
 def texts(path: Path) -> Iterator[str]:
     """Yield every text for readers in a file: comments joined to sentences, and strings."""
     text = path.read_text(encoding="utf-8")
-    if path.suffix == ".md":
+    if path.suffix == ".ipynb":
+        cells = json.loads(text)["cells"]
+        text = " ".join("".join(one["source"]) for one in cells if one["cell_type"] == "markdown")
+    if path.suffix != ".py":
         yield " ".join(text.split())
         return
     tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
@@ -58,11 +63,12 @@ def texts(path: Path) -> Iterator[str]:
 
 
 def roundabout(text: str) -> list[str]:
-    """Return every roundabout phrase of a text with its replacement."""
+    """Return every roundabout phrase of a text with its replacement; questions may begin so."""
     return [
         f"...{text[max(0, found.start() - 40) : found.end() + 30]}...: {plain}"
         for pattern, plain in PLAIN.items()
         for found in re.finditer(pattern, text, re.IGNORECASE)
+        if not (pattern.startswith("^") and "?" in text)
     ]
 
 
