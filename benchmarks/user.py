@@ -5,9 +5,9 @@
 Every row is a command as a user types it, in a process of its own with one thread, or with two if
 its name says so. The times are processor times in seconds except in the column "clock", which is
 the time that passes; "memory" is the largest memory of the process in MB. All are medians over
-rounds. Rows whose names begin with "first" compile in an empty cache. With --python the commands also run
-in another environment, such as one with an earlier version, in turn with this one; the last column
-is then the median of the ratios of the other version to this one.
+rounds. Rows whose names begin with "first" compile in an empty cache. With --python the commands
+also run in another environment, such as one with an earlier version, in turn with this one; the
+last column is then the median of the ratios of the other version to this one.
 """
 
 import argparse
