@@ -11,6 +11,7 @@ draws it over the map. The path of the file goes to stdout, the table of the cur
 else to stderr.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -83,11 +84,22 @@ def _boundaries(options: BoundariesOptions) -> None:
         result = _result(source)
         places = placed_coordinates(options.at, result.axes, result.axis)
         result = result.sel("within", **places) if places else result
-        found = find_boundaries(result, options.source, options.periods, options.lines)
+        found = find_boundaries(
+            result, options.source, options.periods, options.lines, partial(_keep, output)
+        )
     for line in table(found):
         say(line)
     write_boundaries(output, found, options.overwrite)
     print(output, flush=True)
+
+
+def _keep(output: Path, found: "BoundarySet") -> None:
+    """Write the boundaries that were found before an interrupt, beside the output."""
+    from gearchaos.results.files.boundary_file import write_boundaries
+
+    kept = output.with_name(f"{output.stem}_interrupted.h5")
+    write_boundaries(kept, found, overwrite=True)
+    say(f"{kept}: the {len(found.boundaries)} curves that were found before the interrupt")
 
 
 def _result(source: Path) -> "Result":

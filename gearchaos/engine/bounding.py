@@ -1,6 +1,6 @@
 """The boundaries of a map: where its periodic orbits fold, double, turn or graze."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -48,7 +48,11 @@ APPROXIMATE = 1e-4
 
 
 def find_boundaries(
-    result: Result, name: str = "the result", longest: int = PERIODS, lines: int = LINES
+    result: Result,
+    name: str = "the result",
+    longest: int = PERIODS,
+    lines: int = LINES,
+    keep: Callable[[BoundarySet], None] | None = None,
 ) -> BoundarySet:
     """Follow the boundaries of the periodic orbits of a map, over the ranges of both parameters.
 
@@ -63,6 +67,8 @@ def find_boundaries(
     lines : int
         Number of lines across the map in each direction. Branches are traced along each, and the
         special points of these are the starts of boundaries.
+    keep : callable, optional
+        Called with the boundaries found so far if the search is interrupted.
 
     Returns
     -------
@@ -103,10 +109,9 @@ def find_boundaries(
                 search.along_line(result, number, share)
                 bar.update()
         except KeyboardInterrupt as interrupt:
-            interrupt.add_note(
-                f"{bar.n} of {len(places)} lines were searched; nothing is written, and the "
-                f"{len(search.found)} curves found so far are not kept; take fewer --lines"
-            )
+            interrupt.add_note(f"{bar.n} of {len(places)} lines were searched")
+            if keep is not None and search.found:
+                keep(search.described(result))
             raise
         return search.described(result)
 
