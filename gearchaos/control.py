@@ -91,7 +91,7 @@ def _control(options: ControlOptions) -> None:
     with compiling():
         try:
             controller = _controller(options)
-            say(f"trying {options.starts} starts, {options.periods} mesh periods each")
+            say(f"trying {options.starts} starts for {options.periods} periods each")
             check()
             trial = try_controller(controller, options.starts, options.periods)
             check()
@@ -108,7 +108,7 @@ def _control(options: ControlOptions) -> None:
         } | {"input_shares": facts["input_shares"].tolist()}
         print(json.dumps(json_values(written), indent=1))
     else:
-        print("\n".join(table(facts)))
+        print("\n".join(table(facts, trial.periods)))
     if options.output:
         save_figure(control_page(trial.drawing()), options.output)
 
@@ -162,8 +162,8 @@ MEASURES = {
 OF_ELEMENTS = ("time_apart", "force_largest", "gap_peak_to_peak")
 
 
-def table(facts: dict[str, Any]) -> list[str]:
-    """Return what a trial found as lines of text."""
+def table(facts: dict[str, Any], periods: str) -> list[str]:
+    """Return what a trial found as lines of text; ``periods``: the word for its periods."""
     lines = [f"orbit of period {facts['period']}", "  multipliers      with control     input acts"]
     rows = zip(
         facts["multipliers"], facts["closed_multipliers"], facts["input_shares"], strict=True
@@ -172,11 +172,11 @@ def table(facts: dict[str, Any]) -> list[str]:
     lines += [
         f"captured: {facts['captured']} of {facts['starts']} starts, "
         f"{_percent(facts['captured_share'])} ({_percent(facts['captured_low'])} to "
-        f"{_percent(facts['captured_high'])}) after {facts['mesh_periods']} mesh periods"
+        f"{_percent(facts['captured_high'])}) after {facts['mesh_periods']} {periods}"
     ]
     if facts["captured"]:
         lines += [
-            f"capture takes {facts['capture_median']:.0f} mesh periods (median), "
+            f"capture takes {facts['capture_median']:.0f} {periods} (median), "
             f"{facts['capture_95_percent']:.0f} for 95 %"
         ]
     lines += [

@@ -10,6 +10,7 @@ from gearchaos.controlling.controller import Controller
 from gearchaos.engine.run_plan import plan_run
 from gearchaos.figures.control import ControlDrawing
 from gearchaos.outputs.catalogue import SECTION_PART
+from gearchaos.outputs.listing import Catalogue
 from gearchaos.records.contact import contact_summary
 from gearchaos.records.control import ControlledMotion
 from gearchaos.records.wilson import wilson_interval
@@ -59,10 +60,31 @@ class ControlTrial(NamedTuple):
             gearchaos.figures.control_page(trial.drawing())
         """
         controller = self.controller
-        symbols = catalogue_symbols(controller)
         scale, words = _drawn_input(controller)
-        target = controller.maps.points
-        return ControlDrawing(self.motion, scale, words, target, self.free, self.held, symbols)
+        target, catalogue = controller.maps.points, self._catalogue
+        states = catalogue.variables((), {SECTION_PART: controller.system.states})
+        named = {one.name: one for one in states}
+        first, rate = (named[f"section_{name}"] for name in controller.system.states[:2])
+        return ControlDrawing(
+            motion=self.motion,
+            scale=scale,
+            words=words,
+            target=target,
+            free=self.free,
+            held=self.held,
+            states=(first, rate),
+            periods=self.periods,
+        )
+
+    @property
+    def periods(self) -> str:
+        """The word for the periods of the excitation."""
+        return self._catalogue.worded("mesh periods")
+
+    @property
+    def _catalogue(self) -> Catalogue:
+        """The outputs of the model."""
+        return plan_run(self.controller.system.config).lanes.model.catalogue
 
 
 UNITS = {"Nm": "N m", "force": "", "": ""}
@@ -73,9 +95,9 @@ def _drawn_input(controller: Controller) -> tuple[float, str]:
     """Return the factor of inputs in a figure, and the label of the axis."""
     name = controller.actuator
     if controller.load:
-        return 100.0 / abs(controller.load), f"change of the {name} (%)"
+        return 100.0 / abs(controller.load), f"Change of the {name} (%)"
     size, unit = controller.unit
-    return size, f"change of {name}" + f" ({UNITS[unit]})" * bool(UNITS[unit])
+    return size, f"Change of {name}" + f" ({UNITS[unit]})" * bool(UNITS[unit])
 
 
 def try_controller(controller: Controller, starts: int, periods: int) -> ControlTrial:
@@ -98,15 +120,6 @@ def try_controller(controller: Controller, starts: int, periods: int) -> Control
         _measures(controller, begin, controlled=False),
         _measures(controller, end, controlled=True),
     )
-
-
-def catalogue_symbols(controller: Controller) -> tuple[str, str]:
-    """Return the symbols of the first state and of its rate."""
-    run = plan_run(controller.system.config)
-    states = run.lanes.model.catalogue.variables((), {SECTION_PART: run.lanes.states})
-    named = {one.name: one.symbol for one in states}
-    first, rate = (named[f"section_{name}"] for name in controller.system.states[:2])
-    return first, rate
 
 
 def _measures(controller: Controller, states: Floats, *, controlled: bool) -> dict[str, float]:

@@ -6,8 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from gearchaos.arrays import Floats
+from gearchaos.figures.labels import symbol_of
 from gearchaos.figures.page import Page, letter, page, remark
 from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, GREY, LEGEND, ORANGE, VERMILION
+from gearchaos.outputs.variable import Variable
 from gearchaos.records.control import ControlledMotion
 
 SHOWN_STARTS = 4
@@ -31,8 +33,10 @@ class ControlDrawing(NamedTuple):
         The section points of the target orbit.
     free, held : array, shape (samples, states)
         A motion without control, and one that the controller has captured.
-    symbols : (str, str)
-        Symbols of the first state and of its rate.
+    states : (Variable, Variable)
+        Descriptions of the first state and of its rate.
+    periods : str
+        The word for the periods of the excitation.
     """
 
     motion: ControlledMotion
@@ -41,7 +45,13 @@ class ControlDrawing(NamedTuple):
     target: Floats
     free: Floats
     held: Floats
-    symbols: tuple[str, str]
+    states: tuple[Variable, Variable]
+    periods: str
+
+    @property
+    def time_label(self) -> str:
+        """Label of the axes of time."""
+        return f"{self.periods.capitalize()} with control"
 
 
 def control_page(shown: ControlDrawing) -> Page:
@@ -68,7 +78,7 @@ def control_page(shown: ControlDrawing) -> Page:
         panels = figure.subplots(2, 2)
         draw_section(panels[0, 0], shown)
         draw_inputs(panels[1, 0], shown)
-        draw_capture_times(panels[0, 1], shown.motion)
+        draw_capture_times(panels[0, 1], shown)
         draw_portraits(panels[1, 1], shown)
         letter((panels[0, 0], panels[0, 1], panels[1, 0], panels[1, 1]))
     return figure
@@ -84,9 +94,9 @@ def draw_section(axes: Axes, shown: ControlDrawing) -> None:
         label = "target orbit" if number == 0 else None
         axes.axhline(point, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), label=label)
     axes.set_xlim(0, shown_periods(shown.motion))
-    axes.set_xlabel("mesh periods with control")
-    axes.set_ylabel(f"section {shown.symbols[0]}")
-    axes.legend(loc="upper right", **{**LEGEND, "frameon": True})
+    axes.set_xlabel(shown.time_label)
+    axes.set_ylabel(f"Section {symbol_of(shown.states[0])}")
+    axes.legend(loc="upper right", **LEGEND)
     remark(axes, f"{len(section)} of {len(shown.motion.section)} starts")
 
 
@@ -106,12 +116,13 @@ def draw_inputs(axes: Axes, shown: ControlDrawing) -> None:
     for values, colour in zip(inputs, COLOURS, strict=False):
         axes.plot(time, values, color=colour, linewidth=0.5, drawstyle="steps-post")
     axes.set_xlim(0, shown_periods(shown.motion))
-    axes.set_xlabel("mesh periods with control")
+    axes.set_xlabel(shown.time_label)
     axes.set_ylabel(shown.words)
 
 
-def draw_capture_times(axes: Axes, motion: ControlledMotion) -> None:
+def draw_capture_times(axes: Axes, shown: ControlDrawing) -> None:
     """Draw the share of the starts that is captured after some time."""
+    motion = shown.motion
     times = np.sort(motion.capture_time[motion.captured])
     whole = motion.inputs.shape[1]
     share = 100.0 * np.arange(1, times.size + 1) / len(motion.captured)
@@ -119,8 +130,8 @@ def draw_capture_times(axes: Axes, motion: ControlledMotion) -> None:
               where="post", color=BLUE)  # fmt: skip
     axes.set_xlim(0, whole)
     axes.set_ylim(0, 103)
-    axes.set_xlabel("mesh periods with control")
-    axes.set_ylabel("captured starts (%)")
+    axes.set_xlabel(shown.time_label)
+    axes.set_ylabel("Captured starts (%)")
     remark(axes, f"{times.size} of {len(motion.captured)} captured")
 
 
@@ -128,6 +139,8 @@ def draw_portraits(axes: Axes, shown: ControlDrawing) -> None:
     """Draw the motion in the plane of the first state and its rate, before and after."""
     axes.plot(*shown.free[:, :2].T, color=GREY, linewidth=0.25, alpha=0.7, label="without control")
     axes.plot(*shown.held[:, :2].T, color=VERMILION, linewidth=1.0, label="with control")
-    axes.set_xlabel(shown.symbols[0])
-    axes.set_ylabel(shown.symbols[1])
-    axes.legend(loc="upper right", **{**LEGEND, "frameon": True})
+    axes.set_xlabel(symbol_of(shown.states[0]))
+    axes.set_ylabel(symbol_of(shown.states[1]))
+    # Room for the legend above the motion.
+    axes.margins(y=0.2)
+    axes.legend(loc="upper right", **LEGEND)

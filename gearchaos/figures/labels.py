@@ -51,6 +51,12 @@ def label_of(variable: Variable, line_length: int = 60) -> str:
     return "\n".join(fewest)
 
 
+def symbol_of(variable: Variable) -> str:
+    """Compose the symbol of a variable and its unit, for small axes."""
+    symbol, unit = _formula(variable.symbol), _unit(variable)
+    return f"{symbol} ({unit})" if unit else symbol
+
+
 def _names(symbol: str, wording: str) -> bool:
     """Whether a symbol is a name in upright letters that the wording contains."""
     name = re.fullmatch(r"\$\\mathrm\{(.+)\}\$", symbol)
