@@ -122,12 +122,15 @@ def bifurcation(
 
 
 def _reach_of(result: Result, variable: str, lanes: ShownLanes) -> Floats:
-    """Return two standard errors of a variable of each lane, (lanes,), 0 where it has none."""
+    """Return two standard errors of a variable of each lane, (lanes,), 0 where it has none.
+
+    It is 0 as well for variables with several numbers per lane, whose bars would hide each other.
+    """
     error = variable + STANDARD_ERROR
     if variable == LARGEST_EXPONENT or error not in result.variables[variable].errors:
         return np.zeros(lanes.numbers.size)
     spread: Floats = np.nan_to_num(BAND_STANDARD_ERRORS * result.lanes(error)[lanes.numbers])
-    return spread
+    return spread if spread.ndim == 1 else np.zeros(lanes.numbers.size)
 
 
 def _bars(axes: Axes, x: Floats, values: Floats, reach: Floats, color: str) -> Artist:

@@ -104,7 +104,10 @@ def test_a_log_has_all_messages_with_time_and_level(tmp_path):
     assert ended.code == 4 and "--log no/folder/run.log: cannot be written" in ended.err
 
 
-def test_messages_are_records_of_the_standard_logging(caplog, capsys):
+def test_messages_are_records_of_the_standard_logging(caplog, capsys, monkeypatch):
+    # Another package of this process may have silenced all loggers that existed then.
+    monkeypatch.setattr(logging.getLogger("gearchaos"), "disabled", False)
+    monkeypatch.setattr(logging.getLogger("gearchaos"), "propagate", True)
     with caplog.at_level(logging.INFO, "gearchaos"):
         complain("a warning")
     assert ("gearchaos", logging.WARNING, "a warning") in caplog.record_tuples

@@ -163,6 +163,15 @@ def test_only_one_place_changes_the_settings_of_matplotlib():
     assert found == ["style.py"]
 
 
+@pytest.fixture
+def heard():
+    """Ctrl-C is heard: a shell lets processes in the background ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 def test_a_signal_is_for_the_main_thread_and_other_threads_leave_it_alone():
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 

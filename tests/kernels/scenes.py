@@ -11,8 +11,10 @@ from gearchaos_kernels.scene import Scene
 def scene_with(flag: bool | None, method: Any = None, **flags: bool | None) -> Scene:
     """Return a scene all of whose flags are True or None, but for some flags of the model."""
     names = GearPair.__dataclass_fields__
+    # The only field that is no flag.
+    every = dict.fromkeys(names, flag) | {"harmonics": None}
     return Scene(
-        model=GearPair(**{**dict.fromkeys(names, flag), **flags}),
+        model=GearPair(**{**every, **flags}),
         method=method or Rk4(),
         recorders=Recorded(),
         clearance=flag,
