@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from gearchaos import plot
+from gearchaos import basins, plot
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.options import Option, Overwrite, Place, ResultFile, Units, placed_coordinates
@@ -168,10 +168,11 @@ def application(server: Any) -> Any:
 
 
 def _draw(arguments: Sequence[str]) -> None:
-    """Run the plot command; raise a FigureError with its messages if it fails."""
+    """Run `plot` or `basins`, the first argument; raise a FigureError with its messages."""
+    command, *options = arguments
     said = StringIO()
     with redirect_stdout(StringIO()), redirect_stderr(said):
-        code = plot.main([*arguments, "--quiet"])
+        code = {"plot": plot, "basins": basins}[command].main([*options, "--quiet"])
     if code:
         raise FigureError(said.getvalue())
 
