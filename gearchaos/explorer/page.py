@@ -139,6 +139,7 @@ class ExplorerPage:
         self._steady = True
         self._fixed: Mapping[str, float] = {}
         self._basins: Basins | None = None
+        self._last: tuple[str, Mapping[str, float], str] | None = None
         self._motion: Result | None = None
         self._refused: dict[str, str] = {}
 
@@ -248,7 +249,13 @@ class ExplorerPage:
         try:
             self._shown = self._in_units(chosen)
         except ConfigurationError as error:  # The pair has no physical units.
+            self._steady, variable = False, self._value("variable")
             self._switches["units"].value = "dimensionless"
+            self._steady = True
+            # A browser repeats its link while it loads the page: charts that it already has would
+            # be replaced by ones that take no clicks.
+            if self._last != (variable, chosen.fixed, "dimensionless"):
+                self._redraw()
             self._say_fault(error)
             return
         try:
@@ -256,6 +263,7 @@ class ExplorerPage:
         except GearchaosError as error:
             self._say_fault(error)
             return
+        self._last = self._value("variable"), chosen.fixed, self._value("units")
         line = Span(dimension="height", line_color=GREY)
         zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
         if ends := self._ends:

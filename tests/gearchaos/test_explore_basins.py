@@ -4,6 +4,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +18,7 @@ from gearchaos.engine.basins import find_basins
 from gearchaos.explore import main
 from gearchaos.figures.ensembles import COLORS
 from gearchaos.figures.style import VERMILION
+from gearchaos.results.reading.result import Result
 
 from .commands import HANGS, small_config
 
@@ -158,30 +160,49 @@ def test_a_saved_page_has_the_basins_first(folder, capsys, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def page(folder):
+def browser():
     from playwright.sync_api import sync_playwright
 
     if CHROMIUM is None:
         pytest.skip("there is no chromium here")
-    command = [sys.executable, "-m", "gearchaos.explore", "plane.h5", "--no-browser", "--port", "0"]
-    with (
-        sync_playwright() as driver,
-        subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server,
-    ):
+    with sync_playwright() as driver:
+        yield driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split())
+
+
+@contextmanager
+def served(browser, folder: Path, file: str, link: str):
+    """Serve a file as a user does, and open a link to its page."""
+    command = [sys.executable, "-m", "gearchaos.explore", file, "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:
-            chromium = driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split())
-            page = chromium.new_page(viewport={"width": 1200, "height": 900})
+            page = browser.new_page(viewport={"width": 1200, "height": 900})
             page.set_default_timeout(1000.0 * HANGS)
-            page.goto(f"{server.stdout.readline().strip()}?units=dimensionless")
+            page.goto(server.stdout.readline().strip() + link)
             page.locator(".bk-Figure >> nth=4").wait_for()
+            page.locator("pre:has-text('mesh_force')").wait_for()
             yield page
+            page.close()
         finally:
             server.terminate()
 
 
+@pytest.fixture(scope="module")
+def page(folder, browser):
+    with served(browser, folder, "plane.h5", "?units=dimensionless") as page:
+        yield page
+
+
+def click(page, start: int) -> None:
+    """Click into the basins, and wait for the commands of the start that lies there."""
+    box = page.locator(".bk-Figure").first.bounding_box()
+    place = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
+    page.mouse.move(*place)
+    page.mouse.click(*place)
+    page.locator(f"pre:has-text('--at=start={start}')").wait_for()
+
+
 def test_a_click_on_a_start_shows_its_motion_and_names_its_lane(page, plane, folder, monkeypatch):
     numbers = find_basins(plane.sel(pitch_error=0.0)).numbers.reshape(SIDE, SIDE)
-    page.locator("pre:has-text('mesh_force')").wait_for()
     shown = page.evaluate(PICTURE)
     # Basins without an attractor, of negative number, have the first colour.
     assert (np.array(shown["cells"]) == np.searchsorted(np.unique(numbers), numbers)).all()
@@ -192,12 +213,8 @@ def test_a_click_on_a_start_shows_its_motion_and_names_its_lane(page, plane, fol
     legend = page.locator(".bk-panel-models-markup-HTML div").all_inner_texts()
     assert any("1: period 1" in text and "unresolved" in text for text in legend)
 
-    box = page.locator(".bk-Figure").first.bounding_box()
-    place = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
-    page.mouse.move(*place)
-    page.mouse.click(*place)
     start = 1 * SIDE + 4
-    page.locator(f"pre:has-text('--at=start={start}')").wait_for()
+    click(page, start)
     x, y = plane["start_state"][0, start, columns]
     np.testing.assert_allclose(sorted(page.evaluate(PICTURE)["lines"][:2]), sorted([x, y]))
     page.locator("pre:has-text('mesh_force')").wait_for()
@@ -223,3 +240,15 @@ def test_other_values_and_variables_are_drawn(page):
     assert page.locator(fault).all_inner_texts() == []
     page.get_by_text("Sweep as PNG").click()
     page.get_by_text("only the attractors over two states").wait_for()
+
+
+def test_a_link_to_units_that_a_pair_lacks_is_refused_and_clicks_work(browser, plane, folder):
+    known = {name: one for name, one in plane.parameters.items() if name != "length_scale"}
+    variables = list(plane.variables.values())
+    pure = Result(plane.axes, variables, {n: plane[n] for n in plane}, known, plane.metadata)
+    pure.save(folder / "pure.h5")
+    with served(browser, folder, "pure.h5", "?units=physical") as page:
+        page.get_by_text("does not give the length_scale").wait_for()
+        page.wait_for_url("**units=dimensionless*")
+        # Below the message, the page is as without it.
+        click(page, 1 * SIDE + 4)
