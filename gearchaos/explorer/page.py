@@ -109,17 +109,15 @@ class ExplorerPage:
             self._periods = max(DEFAULT_PERIODS, repeats)
         if isinstance(recorded, int) and recorded > 0:
             self._periods = min(self._periods, recorded)
-        choices: dict[str, Any] = {"variable": _worded(result, self._variables())}
-        if self._grid and self._grid.has_basins and len(self._swept) > 1:
-            choices["variable"] = {ATTRACTOR.capitalize(): ATTRACTOR} | choices["variable"]
+        choices: dict[str, Any] = {"variable": self._variables()}
         long = [axis for axis in self._others if result[axis].size > MOST_ENTRIES]
         self._numbers = [*self._swept, *long]
         for axis in self._others:
             if axis not in long:
                 choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
         units = ["dimensionless", "physical"]
-        choices |= {"units": units[::-1] if _is_physical(result) else units}
-        choices |= {"motion_from": ["end", "start"]}
+        units = units[::-1] if _is_physical(result) else units
+        choices |= {"units": units, "motion_from": ["end", "start"]}
         self._switches = {
             name: pn.widgets.Select(options=choices[name], **_named(name, result))
             for name in choices
@@ -184,14 +182,17 @@ class ExplorerPage:
             **WIDE,
         )
 
-    def _variables(self) -> list[str]:
-        """Return the names of all variables to draw, the default first."""
+    def _variables(self) -> dict[str, str]:
+        """Return the names of all variables to draw by their labels, the default first."""
+        result = self._result
         if len(self._swept) == 1:
-            over_orders = (*self._result.axes, ORDER)
-            amplitudes = [name for name in self._result if self._result.dims(name) == over_orders]
-            return [*diagram_variables(self._result), *amplitudes]
-        of_lanes = [name for name in self._result if self._result.dims(name) == self._result.axes]
-        return sorted(of_lanes, key=lambda name: name != LABELS[0])
+            over_orders = (*result.axes, ORDER)
+            amplitudes = [name for name in result if result.dims(name) == over_orders]
+            return _worded(result, [*diagram_variables(result), *amplitudes])
+        of_lanes = [name for name in result if result.dims(name) == result.axes]
+        found = _worded(result, sorted(of_lanes, key=lambda name: name != LABELS[0]))
+        has_basins = self._grid is not None and self._grid.has_basins
+        return {ATTRACTOR.capitalize(): ATTRACTOR} | found if has_basins else found
 
     @property
     def _ends(self) -> list[float]:
