@@ -3,8 +3,8 @@
 Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
 address in the browser is a link to the current view.
 
---save writes an interactive page instead: diagram with stages and exponents, or map, of at most 5
-MB, for readers without the program. It has no motions of lanes.
+--save writes an interactive page instead: diagram with stages and exponents, map, or basins, of at
+most 5 MB, for readers without the program. It has no motions of lanes.
 
 Needs more packages: pip install "gearchaos[explore]".
 """
@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from gearchaos import plot
+from gearchaos import basins, plot
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.options import Option, Overwrite, Place, ResultFile, Units, placed_coordinates
@@ -114,15 +114,27 @@ def _save(result: "Result", options: ExploreOptions) -> None:
     from gearchaos.results.reading.tables import needed
 
     needed("bokeh", "explore")
+    from gearchaos.explorer.starts import start_grid
     from gearchaos.explorer.static import static_page
     from gearchaos.finishing import output_of
+    from gearchaos.outputs.names import START
     from gearchaos.results.files.atomic_file import check_output, replacing
     from gearchaos.results.reading.physical_units import in_units
 
     output = output_of(options.save, options.result)
     check_output(output, options.overwrite)
     part = result.sel("within", **placed_coordinates(options.at, result.axes, result.axis))
-    content = static_page(in_units(part, options.units, physical=False))
+    grid, found = start_grid(part, options.result), None
+    if grid and grid.has_basins and len(grid.axes) == 2:
+        others = [axis for axis in part.axes if axis != START]
+        if several := [axis for axis in others if part[axis].size > 1]:
+            where = " ".join(f"--at {axis}={part[axis][0]:g}" for axis in several)
+            say(f"basins are drawn at one value of each parameter, such as with {where}")
+        else:
+            place = {axis: float(part[axis][0]) for axis in others}
+            found = grid.basins(place, options.units or "")
+            part = grid.result.sel(None, **place)
+    content = static_page(in_units(part, options.units, physical=False), found)
     with replacing(output, overwrite=options.overwrite) as partial:
         partial.write_text(content, encoding="utf-8")
     print(output, flush=True)
@@ -168,10 +180,11 @@ def application(server: Any) -> Any:
 
 
 def _draw(arguments: Sequence[str]) -> None:
-    """Run the plot command; raise a FigureError with its messages if it fails."""
+    """Run `plot` or `basins`, the first argument; raise a FigureError with its messages."""
+    command, *options = arguments
     said = StringIO()
     with redirect_stdout(StringIO()), redirect_stderr(said):
-        code = plot.main([*arguments, "--quiet"])
+        code = {"plot": plot, "basins": basins}[command].main([*options, "--quiet"])
     if code:
         raise FigureError(said.getvalue())
 

@@ -4,22 +4,26 @@ from typing import Any
 
 import holoviews as hv
 import numpy as np
+from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter
 from datashader.reductions import max as highest
 from holoviews.operation.datashader import rasterize
 from holoviews.operation.downsample import downsample1d
 from matplotlib.colors import ListedColormap, to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from gearchaos.arrays import Array
 from gearchaos.explorer.shades import COLOURS
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import waterfall
+from gearchaos.figures.ensembles import basin_patches, basins
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import cell_edges, diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.style import BLACK
 from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER
+from gearchaos.results.reading.ensembles import Basins
 from gearchaos.results.reading.result import Result
 
 Charts = tuple[list[Any], dict[str, str]]
@@ -109,6 +113,36 @@ def two_parameter_map(result: Result, variable: str) -> Charts:
     return [chart], {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
 
 
+def basin_map(result: Result, found: Basins) -> tuple[Charts, list[GlyphRenderer]]:
+    """Draw basins over two states of the starts as `figures.basins` does.
+
+    ``result``: over the two states alone. Also return the sections of the attractors as circles.
+    """
+    axes, names = Figure().subplots(), map_axes(result)
+    image: Any = basins(axes, found)
+    mesh = hv.QuadMesh(
+        (*map(result.__getitem__, names), np.asarray(image.get_array(), dtype=float)),
+        _dimensions(result, *names),
+    )
+    shades = [to_hex(shade) for shade in image.cmap(np.arange(image.cmap.N))]
+    look: Any = {"cmap": shades, "clim": image.get_clim(), "colorbar": False, "height": 580}
+    chart = rasterize(mesh, aggregator=highest()).opts(responsive=True, **look)
+    kinds = {str(one.get_label()): to_hex(one.get_facecolor()) for one in basin_patches(found)}
+    return ([chart], kinds), [_circles(line) for line in axes.lines]
+
+
+def _circles(line: Line2D) -> GlyphRenderer:
+    """Return the markers of a line of matplotlib for a chart of bokeh."""
+    x, y = np.asarray(line.get_data(), dtype=float)
+    fill, size = (
+        to_hex(line.get_markerfacecolor()),
+        1.4 * line.get_markersize(),
+    )  # Points to pixels.
+    look = {"fill_color": fill, "size": size, "line_width": line.get_markeredgewidth()}
+    source = ColumnDataSource({"x": x, "y": y})
+    return GlyphRenderer(data_source=source, glyph=Scatter(x="x", y="y", line_color=BLACK, **look))
+
+
 def _thickened(image: hv.Image) -> hv.Image:
     """Enlarge dots by one pixel if there are too few to be visible.
 
@@ -141,7 +175,7 @@ def _closed(counts: Array) -> Array:
 def _dimensions(result: Result, *names: str) -> list[Any]:
     # The vertical axis has less room.
     labels = [
-        axis_label(result, name, length) for name, length in zip(names, (60, 26), strict=True)
+        axis_label(result, name, length) for name, length in zip(names, (40, 26), strict=True)
     ]
     texts = [plain_text(label) for label in labels]
     # HoloViews merges two axes if the label of one is the label or the name of the other.

@@ -20,13 +20,14 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
-from gearchaos.explorer.charts import diagram, two_parameter_map
+from gearchaos.explorer.charts import Charts, basin_map, diagram, two_parameter_map
 from gearchaos.explorer.motion import SCALES, empty_panel, show
-from gearchaos.explorer.shades import stage_boxes
+from gearchaos.explorer.shades import basin_boxes, stage_boxes
+from gearchaos.explorer.starts import AT_START, ATTRACTOR, start_grid
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import axis_label, in_words, unit_of
-from gearchaos.figures.lanes import diagram_lanes, swept_axes
+from gearchaos.figures.lanes import cell_edges, diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import forces_of
 from gearchaos.figures.style import GREY, VERMILION
@@ -40,6 +41,7 @@ from gearchaos.outputs.names import (
     STATUS,
     coordinate_text,
 )
+from gearchaos.results.reading.ensembles import Basins
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text
@@ -64,6 +66,15 @@ QUARTER = {"flex": "1 1 270px", "min-width": "0"}
 MOST_PERIODS = 1000
 """Mesh periods of a motion at most, to resolve the orders of shafts."""
 
+WIDEST = 320
+"""Largest width of a switch, in pixels: a window of 390 holds it."""
+
+MOST_ENTRIES = 64
+"""Most values of an axis in a menu; more are chosen by a number."""
+
+SECTIONS = "\N{WHITE CIRCLE} motion at the section"
+"""Legend of the circles in basins."""
+
 
 class ExplorerPage:
     """The page of one visitor.
@@ -75,14 +86,20 @@ class ExplorerPage:
     path : str
         Its file, for texts and commands.
     draw : callable
-        Runs the command `plot` with a list of arguments; raises FigureError if that fails.
+        Runs the command `plot` or `basins`, the first of a list of arguments; raises FigureError
+        if that fails.
     """
 
     def __init__(self, result: Result, path: str, draw: Callable[[Sequence[str]], None]) -> None:
-        self._result, self._path, self._draw, self._shown = result, path, draw, result
+        self._file, self._path, self._draw = result, path, draw
+        self._grid = start_grid(result, path)
+        result = self._grid.result if self._grid else result
+        self._result = self._shown = result
         swept = swept_axes(result)[::-1]
         # A parameter with one value has no axis to draw over.
         self._swept = [axis for axis in swept if result[axis].size > 1] or swept[:1]
+        if self._grid:
+            self._swept = self._grid.axes[:2]
         self._others = [axis for axis in result.axes if axis not in self._swept]
         recorded = result.metadata.get("recorded_periods")
         self._periods = DEFAULT_PERIODS
@@ -92,18 +109,22 @@ class ExplorerPage:
             self._periods = max(DEFAULT_PERIODS, repeats)
         if isinstance(recorded, int) and recorded > 0:
             self._periods = min(self._periods, recorded)
-        choices: dict[str, Any] = {"variable": _worded(result, self._variables())}
+        choices: dict[str, Any] = {"variable": self._variables()}
+        long = [axis for axis in self._others if result[axis].size > MOST_ENTRIES]
+        self._numbers = [*self._swept, *long]
         for axis in self._others:
-            choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
+            if axis not in long:
+                choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
         units = ["dimensionless", "physical"]
-        choices |= {"units": units[::-1] if _is_physical(result) else units}
-        choices |= {"motion_from": ["end", "start"]}
+        units = units[::-1] if _is_physical(result) else units
+        choices |= {"units": units, "motion_from": ["end", "start"]}
         self._switches = {
             name: pn.widgets.Select(options=choices[name], **_named(name, result))
             for name in choices
         }
-        for axis in self._swept:
-            given = {"value": float(result[axis][result[axis].size // 2]), "format": "0.[000000]"}
+        for axis in self._numbers:
+            first = result[axis][0 if axis in long else result[axis].size // 2]
+            given = {"value": float(first), "format": "0.[000000]"}
             self._switches[axis] = pn.widgets.FloatInput(**given, **_named(axis, result))
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
         # Every text has its line from the beginning: a new line would move the charts below it.
@@ -115,6 +136,8 @@ class ExplorerPage:
         self._hint = Label(text="", visible=False, **HINT)
         self._steady = True
         self._fixed: Mapping[str, float] = {}
+        self._basins: Basins | None = None
+        self._last: tuple[str, Mapping[str, float], str] | None = None
         self._motion: Result | None = None
         self._refused: dict[str, str] = {}
 
@@ -159,14 +182,17 @@ class ExplorerPage:
             **WIDE,
         )
 
-    def _variables(self) -> list[str]:
-        """Return the names of all variables to draw, the default first."""
+    def _variables(self) -> dict[str, str]:
+        """Return the names of all variables to draw by their labels, the default first."""
+        result = self._result
         if len(self._swept) == 1:
-            over_orders = (*self._result.axes, ORDER)
-            amplitudes = [name for name in self._result if self._result.dims(name) == over_orders]
-            return [*diagram_variables(self._result), *amplitudes]
-        of_lanes = [name for name in self._result if self._result.dims(name) == self._result.axes]
-        return sorted(of_lanes, key=lambda name: name != LABELS[0])
+            over_orders = (*result.axes, ORDER)
+            amplitudes = [name for name in result if result.dims(name) == over_orders]
+            return _worded(result, [*diagram_variables(result), *amplitudes])
+        of_lanes = [name for name in result if result.dims(name) == result.axes]
+        found = _worded(result, sorted(of_lanes, key=lambda name: name != LABELS[0]))
+        has_basins = self._grid is not None and self._grid.has_basins
+        return {ATTRACTOR.capitalize(): ATTRACTOR} | found if has_basins else found
 
     @property
     def _ends(self) -> list[float]:
@@ -191,7 +217,7 @@ class ExplorerPage:
     def _allowed(self, name: str) -> bool:
         """Whether a switch has a valid value; an invalid one from a link becomes the first."""
         choices = getattr(self._switches[name], "values", None)
-        if name in self._swept and self._snapped(name):
+        if name in self._numbers and self._snapped(name):
             return False
         if self._value(name) in choices if choices else _is_number(self._value(name)):
             return True
@@ -210,7 +236,8 @@ class ExplorerPage:
         nearest = float(np.clip(value, there.min(), there.max()))
         self._switches[name].value = nearest
         ends = f"{there.min():.6g} to {there.max():.6g}"
-        self._say(f"{name} = {value:.6g}: outside of the sweep, {ends}; {nearest:.6g} is shown")
+        whole = "grid of starts" if self._grid and name in self._grid.axes else "sweep"
+        self._say(f"{name} = {value:.6g}: outside of the {whole}, {ends}; {nearest:.6g} is shown")
         return True
 
     def _refuse(self, name: str) -> None:
@@ -219,24 +246,27 @@ class ExplorerPage:
 
     def _redraw(self) -> None:
         """Draw the sweep with the variable, axis values and units of the switches, and a motion."""
-        chosen = self._result.sel(None, **{axis: self._value(axis) for axis in self._others})
-        draw = two_parameter_map if len(self._swept) > 1 else diagram
+        chosen = self._result.sel("nearest", **{axis: self._value(axis) for axis in self._others})
         try:
             self._shown = self._in_units(chosen)
         except ConfigurationError as error:  # The pair has no physical units.
+            self._steady, variable = False, self._value("variable")
             self._switches["units"].value = "dimensionless"
+            self._steady = True
+            # A browser repeats its link while it loads the page: charts that it already has would
+            # be replaced by ones that take no clicks.
+            if self._last != (variable, chosen.fixed, "dimensionless"):
+                self._redraw()
             self._say_fault(error)
             return
         try:
-            charts, kinds = draw(self._shown, self._value("variable"))
+            (charts, kinds), drawn = self._drawn(chosen.fixed)
         except GearchaosError as error:
             self._say_fault(error)
             return
+        self._last = self._value("variable"), chosen.fixed, self._value("units")
         line = Span(dimension="height", line_color=GREY)
         zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
-        boxes: list[Any] = []
-        if draw is diagram:
-            boxes, kinds = stage_boxes(self._shown, diagram_lanes(self._shown).limits)
         if ends := self._ends:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
@@ -244,7 +274,7 @@ class ExplorerPage:
             # The second chart shows exponents, and has a line at zero.
             lines: list[Any] = [zero, *self._marks]
             if chart is charts[0]:
-                lines = [*self._marks, *boxes, self._hint]
+                lines = [*self._marks, *drawn, self._hint]
             chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
             chart.opts(active_tools=["box_zoom", "wheel_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
@@ -253,8 +283,24 @@ class ExplorerPage:
         self._charts[:] = [pn.pane.HoloViews(hv.Layout(charts).cols(1), **WIDE)]
         swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
         texts = (swatch.format(colour, escape(name)) for name, colour in kinds.items())
-        self._kinds.object = "".join(texts)
+        circles = self._basins is not None and self._value("variable") == ATTRACTOR
+        self._kinds.object = "".join([*texts, *([SECTIONS] if circles else [])])
         self._move()
+
+    def _drawn(self, place: Mapping[str, float]) -> tuple[Charts, list[Any]]:
+        """Draw the charts of the sweep at a place on its other axes, with what lies over them."""
+        variable, shown = self._value("variable"), self._shown
+        if self._grid and self._grid.has_basins:
+            self._basins = self._grid.basins(place, self._value("units"))
+            if variable == ATTRACTOR:
+                return basin_map(shown, self._basins)
+        if len(self._swept) > 1:
+            return two_parameter_map(shown, variable), []
+        charts, _ = diagram(shown, variable)
+        boxes, kinds = stage_boxes(shown, diagram_lanes(shown).limits)
+        if self._basins:
+            boxes, kinds = basin_boxes(self._basins)
+        return (charts, kinds), boxes
 
     def _nearest(self, x: float | None, y: float | None) -> dict[str, int]:
         """Return the number of the value nearest to a place in a chart, for each swept axis."""
@@ -268,7 +314,9 @@ class ExplorerPage:
             words = self._words({axis: self._shown[axis][at[axis]] for axis in at})
             self._pointed.object = words
             with pn.io.unlocked():
-                text = unescape(re.sub("<[^>]*>", "", words))
+                # In a plane the axes show the place: without it the text fits into the chart.
+                drop = "<b>.*</b>" if self._grid and len(at) > 1 else ""
+                text = unescape(re.sub("<[^>]*>", "", re.sub(drop, "", words))).strip()
                 right = float(x or 0.0) > float(np.mean(self._shown[self._swept[0]][[0, -1]]))
                 side = {"text_align": "right" if right else "left", "x_offset": -8 if right else 8}
                 self._hint.update(x=x, y=y, text=text, visible=True, **side)
@@ -283,20 +331,26 @@ class ExplorerPage:
 
     def _zoom(self, x_range: Any, y_range: Any) -> None:
         if x_range and y_range:
-            whole = len(self._swept) == 1 and np.allclose(
-                x_range, diagram_lanes(self._shown).limits
-            )
-            ends = () if whole else (*x_range, *y_range)
+            ends = () if self._is_whole(x_range, y_range) else (*x_range, *y_range)
             self._window.value = [float(f"{end:.6g}") for end in ends]
             self._say_commands()
+
+    def _is_whole(self, *ranges: Any) -> bool:
+        """Whether a chart with these limits shows the whole sweep."""
+        if len(self._swept) == 1:
+            return np.allclose(ranges[0], diagram_lanes(self._shown).limits)
+        edges = [cell_edges(np.asarray(self._shown[axis], dtype=float)) for axis in self._swept]
+        return np.allclose(ranges, [one[[0, -1]] for one in edges])
 
     def _move(self) -> None:
         """Show the motion of the lane nearest to the values of the switches."""
         fault, self._motion, start = "", None, self._value("motion_from")
         try:
             lane = self._result.sel("within", **{a: self._value(a) for a in self._result.axes})
-            self._fixed = lane.fixed
             at = {a: self._shown[a][self._result[a] == lane.fixed[a]][0] for a in self._swept}
+            if self._grid:
+                lane = self._file.sel(None, **self._grid.start(lane.fixed))
+            self._fixed = lane.fixed
             with pn.io.unlocked():
                 for mark, value in zip(self._marks, at.values(), strict=True):
                     mark.location = float(value)
@@ -309,6 +363,7 @@ class ExplorerPage:
             with pn.io.unlocked(), pn.state.curdoc.models.freeze():
                 show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion
+            self._say_commands()
         except (GearchaosError, MemoryError) as error:
             fault = _reason(error)
         self._say(fault)
@@ -316,6 +371,8 @@ class ExplorerPage:
     @property
     def _coordinate(self) -> str:
         """The coordinate of the drawn section, or the first one of the machine."""
+        if self._grid:
+            return self._grid.axes[0].removeprefix(AT_START).removesuffix("_rate")
         name = str(self._value("variable"))
         of_section = name.startswith(SECTION)
         first: str = self._result.variables[STATE].flags[0]
@@ -330,7 +387,9 @@ class ExplorerPage:
         """Word the swept value, motion, period, exponent and chosen variable of a lane."""
         lane = self._shown.sel(None, **at)
         words = ["diverged"] if lane[STATUS] else []
-        if LABELS[0] in lane and not words:
+        if self._basins and (number := self._attractor(at)) > 0:
+            words.append(f"attractor {number}")
+        if LABELS[0] in lane and not lane[STATUS]:
             motion, period = (int(lane[name]) for name in LABELS)
             words.append(label_text(lane.variables[LABELS[0]].flags[motion], period))
         for name in dict.fromkeys([LARGEST_EXPONENT, self._value("variable")]):
@@ -338,6 +397,13 @@ class ExplorerPage:
                 symbol = lane.attributes(name).get("symbol") or name.replace("_", " ")
                 words.append(plain_text(f"{symbol} = {lane[name]:.4g} {unit_of(lane, name)}"))
         return f"<b>{escape(plain_text(in_words(self._shown, at)))}</b> {escape(', '.join(words))}"
+
+    def _attractor(self, at: Mapping[str, float]) -> int:
+        """Return the number of the attractor of a start, at most 0 without one."""
+        assert self._basins is not None
+        place = [int(np.abs(self._shown[axis] - at[axis]).argmin()) for axis in self._swept]
+        sizes = [self._shown[axis].size for axis in self._swept]
+        return int(self._basins.numbers[0].reshape(sizes)[*place])
 
     def _say(self, text: str) -> None:
         self._fault.object = f"<b style='color:{VERMILION}'>{escape(text)}</b>" if text else ""
@@ -358,27 +424,46 @@ class ExplorerPage:
         between = ["--from", f"{ends[0]}", "--to", f"{ends[1]}"] if ends else []
         how = ["--begin", self._value("motion_from"), "--periods", f"{self._periods}"]
         shown = ["--variable", self._value("variable")]
+        sweep = ["plot", self._path, *here, *between, *shown, *units]
+        if self._grid:
+            sweep = ["basins", self._path, *here, *units]
         return {
-            "sweep": ["plot", self._path, *here, *between, *shown, *units],
+            "sweep": sweep,
             "lane": ["response", self._path, *at.values(), *how],
             "motion": ["plot", motion, "--variable", self._coordinate, *of_motion],
             "force": ["plot", motion, "--variable", self._force, *of_motion],
         }
 
+    @property
+    def _has_figure(self) -> bool:
+        """Whether a command draws the sweep as the page does."""
+        of_two = self._grid is not None and len(self._grid.axes) == 2
+        return self._grid is None or (of_two and self._value("variable") == ATTRACTOR)
+
     def _say_commands(self) -> None:
-        lines = (f"python -m gearchaos.{shlex.join(w)}\n" for w in self._arguments().values())
+        words = self._arguments()
+        if not self._force:  # No motion yet, or a machine without clearance elements.
+            del words["force"]
+        if self._grid and self._has_figure:
+            words["sweep"] += ["--output", f"{Path(self._path).stem}_basins.png"]
+        elif self._grid and not self._grid.has_basins:
+            del words["sweep"]
+        lines = (f"python -m gearchaos.{shlex.join(w)}\n" for w in words.values())
         self._commands.object = f"<pre style='white-space: pre-wrap'>{escape(''.join(lines))}</pre>"
 
     def _saved(self, name: str, kind: str) -> BytesIO:
         """Draw a figure as the displayed command does, and return its file."""
         # From the result in memory: its file may have been removed or replaced.
-        drawn = self._result if name == "sweep" else self._motion
+        drawn = self._file if name == "sweep" else self._motion
         if drawn is None:
             raise FigureError("there is no motion to draw")
+        if name == "sweep" and not self._has_figure:
+            raise FigureError("of a grid of starts, only the attractors over two states are drawn")
         with TemporaryDirectory() as folder:
             path, target = Path(folder, "drawn.h5"), Path(folder, f"figure.{kind}")
             drawn.save(path)
-            self._draw([str(path), *self._arguments()[name][2:], "--output", str(target)])
+            command, _, *options = self._arguments()[name]
+            self._draw([command, str(path), *options, "--output", str(target)])
             return BytesIO(target.read_bytes())
 
 
@@ -387,8 +472,9 @@ def _named(switch: str, result: Result) -> dict[str, Any]:
     name = switch.replace("_", " ").capitalize()
     if switch in result.axes:
         name = plain_text(axis_label(result, switch, 200))
-    # About 7 pixels for each letter of the name.
-    return {"name": name, "width": 320 if switch == "variable" else max(170, 7 * len(name))}
+    # About 7 pixels for each letter of the name, within a narrow window.
+    width = WIDEST if switch == "variable" else min(max(170, 7 * len(name)), WIDEST)
+    return {"name": name, "width": width, "stylesheets": ["label { white-space: normal; }"]}
 
 
 def _worded(result: Result, names: Sequence[str]) -> dict[str, str]:

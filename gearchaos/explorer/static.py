@@ -16,14 +16,17 @@ from matplotlib.figure import Figure
 from gearchaos.arrays import Array, Floats
 from gearchaos.errors import FigureError
 from gearchaos.explorer.shades import COLOURS, stage_boxes
+from gearchaos.explorer.starts import ATTRACTOR
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import diagram_variables
+from gearchaos.figures.ensembles import basin_patches, basins
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import cell_edges, diagram_lanes, map_axes, swept_axes
 from gearchaos.figures.maps import parameter_map
 from gearchaos.figures.panel import robust_limits
-from gearchaos.figures.style import GREY, OVERLAID
+from gearchaos.figures.style import BLACK, GREY, OVERLAID
 from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, UNSWEPT, WAYS
+from gearchaos.results.reading.ensembles import Basins
 from gearchaos.results.reading.jumps import directions_of
 from gearchaos.results.reading.result import Result
 
@@ -45,9 +48,10 @@ LOOK: Any = {
 }
 
 
-def static_page(result: Result) -> str:
+def static_page(result: Result, found: Basins | None = None) -> str:
     """Return an HTML page with the charts of a sweep or a map and a menu of its variables.
 
+    ``found``: basins of a result over the two states of a grid of starts; they are drawn first.
     Charts with more numbers than fit are thinned out: of each lane the last section points are
     kept, then every n-th lane or cell.
 
@@ -58,25 +62,33 @@ def static_page(result: Result) -> str:
     """
     numbers = MOST_NUMBERS
     while numbers > 1000:
-        page = _page(result, numbers)
+        page = _page(result, numbers, found)
         if len(page.encode()) <= LARGEST_PAGE:
             return page
         numbers //= 2
     raise FigureError(f"the page is larger than {LARGEST_PAGE} bytes; choose a slice with --at")
 
 
-def _page(result: Result, numbers: int) -> str:
+def _page(result: Result, numbers: int, found: Basins | None) -> str:
     """Return the page with at most this number of numbers in its charts."""
     of_map = len(swept_axes(result)) > 1
     names = _map_variables(result) if of_map else diagram_variables(result)
-    draw, charts, ranges = _map if of_map else _diagram, {}, list[Any]()
+    entries = [(name, plain_text(axis_label(result, name, 200))) for name in names]
+    entries[:0] = [(ATTRACTOR, ATTRACTOR.capitalize())] if found else []
+    names = [name for name, _ in entries]
+    charts, ranges = {}, list[Any]()
     for name in names:
-        panel, kinds = draw(result, name, max(1, numbers // len(names)))
+        # Half of all numbers are those of the basins.
+        most = max(1, numbers // (2 * len(names) if found else len(names)))
+        most = numbers // 2 if name == ATTRACTOR else most
+        if of_map:
+            panel, kinds = _map(result, name, most, found if name == ATTRACTOR else None)
+        else:
+            panel, kinds = _diagram(result, name, most)
         # All charts move together, whichever is shown.
         panel.x_range = ranges[0] if ranges else panel.x_range
         ranges.append(panel.x_range)
         charts[name] = column(panel, _text(_legend(kinds)), visible=name == names[0], **WIDE)
-    entries = [(name, plain_text(axis_label(result, name, 200))) for name in names]
     menu = Select(options=entries, value=names[0], title="Variable", width=500)
     show = "for (const [name, one] of Object.entries(charts)) one.visible = name == menu.value"
     menu.js_on_change("value", CustomJS(args={"charts": charts, "menu": menu}, code=show))
@@ -157,10 +169,12 @@ def _exponents(result: Result, most: int, x_range: Any) -> Any:
     return panel
 
 
-def _map(result: Result, variable: str, most: int) -> tuple[Any, dict[str, str]]:
-    """Draw a variable over two parameters as `figures.parameter_map` does."""
+def _map(
+    result: Result, variable: str, most: int, found: Basins | None
+) -> tuple[Any, dict[str, str]]:
+    """Draw basins, or a variable over two parameters, as the figures do."""
     axes, (across, up) = Figure().subplots(), map_axes(result)
-    image: Any = parameter_map(axes, result, variable)
+    image: Any = basins(axes, found) if found else parameter_map(axes, result, variable)
     legend, colours = axes.get_legend(), image.cmap
     numbers = np.ma.filled(image.get_array().astype(float), np.nan)
     edges = [cell_edges(np.asarray(result[name], dtype=float)) for name in (across, up)]
@@ -169,7 +183,8 @@ def _map(result: Result, variable: str, most: int) -> tuple[Any, dict[str, str]]
     cells = numbers[np.ix_(places[1], places[0])].astype(np.float32)
     ends = [(float(one[0]), float(one[-1])) for one in edges]
     panel = _panel(result, across, up, 560, ends)
-    panel.hover.tooltips = [("", "$x, $y"), (variable, "@image")]
+    if not found:
+        panel.hover.tooltips = [("", "$x, $y"), (variable, "@image")]
     shades = [to_hex(one) for one in colours(np.linspace(0.0, 1.0, min(colours.N, COLOURS)))]
     low, high = image.get_clim()
     mapper = LinearColorMapper(shades, low=low, high=high, nan_color=GREY)
@@ -178,7 +193,12 @@ def _map(result: Result, variable: str, most: int) -> tuple[Any, dict[str, str]]
     panel.image(image=[cells], color_mapper=mapper, **frame)
     if not isinstance(colours, ListedColormap):
         panel.add_layout(ColorBar(color_mapper=mapper), "right")
+    for line in axes.lines if found else ():
+        look = {"color": to_hex(line.get_markerfacecolor()), "size": 1.4 * line.get_markersize()}
+        panel.scatter(*line.get_data(), line_color=BLACK, **look)
     patches: list[Any] = legend.legend_handles if legend else []
+    if found:
+        patches = basin_patches(found)
     return panel, {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
 
 

@@ -4,14 +4,17 @@ import re
 from unicodedata import lookup
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
+# Unicode has no subscript y: that of gamma has the same shape.
+_LOWERED = str.maketrans(
+    "0123456789aehikmnprstxy", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ\N{GREEK SUBSCRIPT SMALL LETTER GAMMA}"
+)
 
 
 def plain_text(label: str) -> str:
     """Write a label in Unicode without formulae, such as δ₅' for ``$\\delta_5'$``."""
     text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
     text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
-    text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
+    text = re.sub(r"_\{?([\daehikmnprstxy]+)\}?", lambda found: found[1].translate(_LOWERED), text)
     return re.sub(r"[${}\\]", "", text)
 
 

@@ -316,13 +316,17 @@ def basins_page(
             drawn: list[Any] = fractions(axes, found)
         else:
             basins(axes, found)
-            drawn = [Patch(**_look(b), lw=0.3, label=_in_words(b)) for b in found.basins]
-            drawn.append(Line2D([], [], **SECTION_POINTS))
+            drawn = [*basin_patches(found), Line2D([], [], **SECTION_POINTS)]
             fixed = fixed | {found.parameter: float(found.values[0])}
         few_ticks(axes, 8, 6)
         figure.suptitle(in_words(found.result, fixed))
         legend_below(figure, drawn, legend_title(found.result), columns=2)
     return figure
+
+
+def basin_patches(found: Basins) -> list[Patch]:
+    """Return a patch in the colour of each basin, labelled with number, motion and share."""
+    return [Patch(**_look(one), lw=0.3, label=_in_words(one)) for one in found.basins]
 
 
 def _look(one: Basin) -> dict[str, Any]:

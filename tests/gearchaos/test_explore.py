@@ -197,7 +197,9 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     # A line at the lane in both charts, and that of zero among the exponents.
     lines = page.evaluate(f"({FIGURES})().slice(0, 2).map({LINES})")
     assert [sorted(at) for at in lines] == [[value], [0.0, value]]
-    force, *strips = shown["Tangential mesh force, N_y (unit kₘb′)"]
+    force, *strips = shown[
+        "Tangential mesh force, N\N{GREEK SUBSCRIPT SMALL LETTER GAMMA} (unit kₘb′)"
+    ]
     assert force["y"] == motion["mesh_force_tangential"][0].tolist()
     assert sum(len(strip["left"]) for strip in strips) > 0
     text = texts(page)

@@ -39,6 +39,24 @@ def test_the_record_is_raised_to_whole_cycles_of_the_orders():
         simulation(f"outputs.orders={primes}")
 
 
+def test_a_response_has_the_transmission_error_whose_statistics_a_sweep_reports():
+    periods = 20
+    lengths = ("integration.transient_periods=60", f"integration.recorded_periods={periods}")
+    asked = (*SHORT, "outputs.loads=true", *lengths, "sweep.count=3", *AXIAL)
+    result = gearchaos.respond(load_config(PAN2021, asked), periods)
+    error = result["transmission_error"]
+    assert np.abs(result["mesh_error"]).max() > 0.0
+    np.testing.assert_allclose(error, result["delta_5"] + result["mesh_error"], atol=1e-14)
+    # Means are trapezoidal sums; extremes are those between the steps as well.
+    mean = np.trapezoid(error) / (error.shape[1] - 1)
+    square = np.trapezoid((error - mean[:, np.newaxis]) ** 2) / (error.shape[1] - 1)
+    known = {"mean": mean, "rms": np.sqrt(square), "peak_to_peak": np.ptp(error, axis=1)}
+    for name, values in known.items():
+        reported = result[f"transmission_error_{name}"]
+        assert reported == pytest.approx(values, rel=1e-3 if name == "peak_to_peak" else 1e-5), name
+    assert result.attributes("transmission_error")["symbol"] == r"$\delta_5 + e$"
+
+
 def test_a_sweep_reports_them_and_its_file_keeps_them(tmp_path):
     lengths = ("integration.transient_periods=60", "sweep.count=6")
     asked = (*SHORT, "outputs.loads=true", "outputs.contact=true", *lengths, *AXIAL)

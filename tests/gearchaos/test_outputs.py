@@ -206,7 +206,7 @@ def test_a_result_with_an_array_too_many_is_not_made():
 UNITS = {
     "um": "delta_5 section_delta_5 amplitude_delta_1 delta_3_peak_to_peak mesh_error "
     "amplitude_transmission_error transmission_error_mean transmission_error_peak_to_peak "
-    "transmission_error_rms",
+    "transmission_error_rms transmission_error",
     "m/s": "delta_5_rate section_delta_2_rate delta_4_rate_largest approach_mean_tangential "
     "approach_largest_axial slowest_crossing",
     "m/s^2": "delta_5_acceleration delta_4_acceleration",

@@ -75,6 +75,7 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
         "mesh_period": np.full(2, 7.17),
         **record,
         "mesh_error": 0.0 * record["delta_5"],
+        "transmission_error": 1.0 * record["delta_5"],
         "mesh_force_tangential": record["delta_5"],
         "contact_tangential": np.ones((2, PERIODS * STEPS + 1)),
     }

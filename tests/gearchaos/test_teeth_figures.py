@@ -84,6 +84,7 @@ def known_teeth(
         "mesh_period": np.ones(1),
         **record,
         "mesh_error": 0.01 * record["delta_5"],
+        "transmission_error": 1.01 * record["delta_5"],
         "mesh_force_tangential": record["delta_5"],
         "contact_tangential": np.ones((1, kept * STEPS + 1)),
     }

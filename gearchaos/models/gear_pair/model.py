@@ -162,11 +162,11 @@ class GearPairModel(Model):
     def motion(
         self, system: LaneSystem, states: Floats, steps_per_period: int, first_period: int
     ) -> dict[str, Array]:
-        """Return accelerations, pitch error, mesh forces and contact along a motion, by name."""
+        """Return accelerations, errors, mesh forces and contact along a motion, by name."""
         assert isinstance(system, GearPairs)
         found = mesh_motion(system, states, steps_per_period, first_period)
         motion = accelerations(system, found.accelerations)
-        motion[MESH_ERROR] = found.pitch_error
+        motion |= {MESH_ERROR: found.pitch_error, TRANSMISSION_ERROR: found.transmission_error}
         for way in DIRECTIONS[: system.elements]:
             motion[f"{MESH_FORCE}{way}"] = getattr(found, f"force_{way}")
             motion[f"contact_{way}"] = getattr(found, f"contact_{way}")

@@ -79,6 +79,13 @@ MESH_IN_TIME_PART = Part(
             dims=(LANE_AXES, names.TIME),
             scale=Quantity.LENGTH,
         ),
+        Output(
+            TRANSMISSION_ERROR,
+            "transmission error",
+            r"$\delta_5 + e$",
+            dims=(LANE_AXES, names.TIME),
+            scale=Quantity.LENGTH,
+        ),
     ),
     in_time=True,
 )

@@ -16,7 +16,7 @@ from gearchaos_kernels.plan import Floats
 def mesh_motion(
     system: GearPairs, states: Floats, steps_per_period: int, first_period: int = 0
 ) -> MeshMotion:
-    """Return mesh forces, contact, accelerations and pitch error along a motion.
+    """Return mesh forces, contact, accelerations and errors along a motion.
 
     Parameters
     ----------
@@ -62,6 +62,7 @@ def mesh_motion(
         contact_axial=found.contact[:, :, 1].copy() if axial else nothing.astype(np.uint8),
         accelerations=found.accelerations,
         pitch_error=_pitch_error(system, nothing.shape, steps_per_period, first_period),
+        transmission_error=found.observed[:, :, 0].copy(),
     )
 
 

@@ -279,7 +279,7 @@ class GearPairs(LaneSystem):
 
 
 class MeshMotion(NamedTuple):
-    """Mesh forces, contact, accelerations and pitch error along a motion, dimensionless.
+    """Mesh forces, contact, accelerations and errors along a motion, dimensionless.
 
     Attributes
     ----------
@@ -292,6 +292,8 @@ class MeshMotion(NamedTuple):
         delta_5'', then delta_1'' to delta_4'' as far as the scene has them.
     pitch_error : array, shape (lanes, samples)
         e.
+    transmission_error : array, shape (lanes, samples)
+        delta_5 + e.
     """
 
     force_tangential: Floats
@@ -300,3 +302,4 @@ class MeshMotion(NamedTuple):
     contact_axial: NDArray[np.uint8]
     accelerations: Floats
     pitch_error: Floats
+    transmission_error: Floats
