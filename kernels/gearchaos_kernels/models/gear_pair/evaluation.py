@@ -53,8 +53,7 @@ def mesh_motion(
         separated = motion.contact_tangential == 0
     """
     found = evaluation.evaluate(system, states, steps_per_period, first_period)
-    axial = system.effects.axial
-    nothing = np.zeros(states.shape[:2])
+    axial, nothing = system.effects.axial, np.zeros(states.shape[:2])
     return MeshMotion(
         force_tangential=found.forces[:, :, 0].copy(),
         force_axial=found.forces[:, :, 1].copy() if axial else nothing,
