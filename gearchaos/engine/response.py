@@ -7,13 +7,14 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status
 
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
+from gearchaos.configuration.methods import METHODS
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.computing import integrate_places
 from gearchaos.engine.control import with_controllers
 from gearchaos.engine.excitation import whole_lengths
 from gearchaos.engine.kept import arrays_of
 from gearchaos.engine.lanes import Lanes
-from gearchaos.engine.run_plan import RunPlan, plan_run
+from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration, Given, configuration_of
@@ -21,6 +22,9 @@ from gearchaos.models.protocol import Model
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS, NO_CONTACT
 from gearchaos.outputs.names import MESH_PERIOD
 from gearchaos.results.reading.result import Result
+
+FEWEST_SAMPLES = 60
+"""Fewest steps per mesh period of a response whose configuration does not give their number."""
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
@@ -78,7 +82,19 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
     whole = whole.replace("integration.recorded_periods", recorded)
     run = plan_run(whole.replace("outputs.section_points", recorded))
     raised = f"integration.recorded_periods raised from {given} to {recorded}"
-    return run.with_notes(raised if recorded > given else "")
+    return _with_samples(run).with_notes(raised if recorded > given else "")
+
+
+def _with_samples(run: RunPlan) -> RunPlan:
+    """Return a run with enough steps for curves, unless the configuration gives their number.
+
+    The default of an exact method is too few for them.
+    """
+    plan, given = run.plan, run.config.integration.steps_per_period
+    if given is not None or not METHODS[plan.method].exact:
+        return run
+    steps = plan.steps_per_period * -(-FEWEST_SAMPLES // plan.steps_per_period)
+    return run.with_choice(Chosen(steps, plan.transient_periods), "")
 
 
 def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> Result:

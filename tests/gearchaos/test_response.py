@@ -10,12 +10,14 @@ import pytest
 import xarray as xr
 
 from gearchaos import ConfigurationError, Result, load_config, open_result, respond
+from gearchaos.engine.response import prepared
 from gearchaos.response import main
 
 from .commands import run_module, same_data
 from .short_sweeps import PAN2021
 
-FULL = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_full.toml"
+SWEEPS = Path(__file__).resolve().parents[2] / "sweeps"
+FULL, BASINS = SWEEPS / "pan2021_full.toml", SWEEPS / "basins.toml"
 STEPS, PERIODS, RECORDED = 192, 3, 6
 SHORT = (
     f"integration.steps_per_period={STEPS}",
@@ -76,6 +78,12 @@ def test_over_a_period_the_mesh_force_carries_the_load(result):
     force = result["mesh_force_tangential"][0, :STEPS]
     assert np.mean(force) == pytest.approx(load / np.cos(angle), rel=1e-7)
     assert np.ptp(force) > 0.01
+
+
+@pytest.mark.parametrize(("given", "steps"), [((), 60), (("integration.steps_per_period=12",), 12)])
+def test_flow_maps_have_enough_samples_unless_their_steps_are_given(given, steps):
+    config = load_config(BASINS, ("start.count=2", *given))
+    assert prepared(config, 1).plan.steps_per_period == steps
 
 
 def test_a_response_of_flow_maps_is_as_exact_with_few_steps_as_with_many(tmp_path):
