@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import Status, integrate
 
+from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.interrupts import check
@@ -89,6 +90,13 @@ def refinable(result: Result, name: str) -> Configuration:
     return config
 
 
+def _steps_given(result: Result, name: str) -> bool:
+    """Whether the configuration in a result gives the number of steps."""
+    text = stored_text(result, name, "configuration_resolved")
+    config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
+    return config.integration.steps_per_period is not None
+
+
 def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     """Return the configuration of the motion that continues from the end of a lane.
 
@@ -126,6 +134,10 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
         "scene.effects": config.needed_effects,
     }.items():
         config = config.replace(key, value)
+    method = METHODS.get(config.integration.method)
+    if method is not None and method.exact and not _steps_given(lane, name):
+        # The steps do not change the motion, and a response may need more of them.
+        config = config.replace("integration.steps_per_period", None)
     return config.replace("integration.transient_periods", 0) if begin == "end" else config
 
 
