@@ -101,6 +101,11 @@ class Tables(Titled):
         """The key that names each swept parameter, such as ``sweep.parameter``."""
         return {sweep.parameter: f"{table}.parameter" for table, sweep in self.sweeps.items()}
 
+    @property
+    def unit_of_inputs(self) -> str:
+        """Unit of the inputs, as names of efforts and of `absolute_limit` end."""
+        return self.absolute_limit.removeprefix("limit_")
+
     def is_idle(self, actuator: str) -> bool:
         """Whether the steady value of an input is 0, so that nothing is a share of it."""
         del actuator

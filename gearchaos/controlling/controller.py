@@ -109,7 +109,7 @@ class Controller:
         found = model_of(config).input_unit(config, axis_values(config))
         if found is None:
             return 1.0, ""
-        return float(np.ravel(found)[0]), config.absolute_limit.removeprefix("limit_")
+        return float(np.ravel(found)[0]), config.unit_of_inputs
 
     def _largest_input(self) -> float:
         """Return the limit in the units of the equations."""

@@ -19,7 +19,7 @@ def input_unit(run: RunPlan) -> str:
     if run.config.control is None:
         return ""
     known = run.lanes.model.input_unit(run.config, run.lanes.values_of(np.arange(1)))
-    return "" if known is None else run.config.absolute_limit.removeprefix("limit_")
+    return "" if known is None else run.config.unit_of_inputs
 
 
 def control_arrays(

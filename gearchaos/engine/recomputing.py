@@ -38,8 +38,17 @@ def computable(result: Result, name: str) -> Configuration:
 
     Messages call the result ``name``. Raises FileError if it does not contain its configuration.
     """
+    return _as_computed(_stored(result, name), result, name)
+
+
+def _stored(result: Result, name: str) -> Configuration:
+    """Return the configuration in a result."""
     text = stored_text(result, name, "configuration_resolved")
-    config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
+    return Configuration.from_toml(text, f"{name} (configuration_resolved)")
+
+
+def _as_computed(config: Configuration, result: Result, name: str) -> Configuration:
+    """Return the configuration in a result with what is fixed, and with what was computed."""
     if config.control is not None:
         raise ConfigurationError(
             f"{name}: is a sweep with [control], whose lanes are not recomputed one by one; "
@@ -90,13 +99,6 @@ def refinable(result: Result, name: str) -> Configuration:
     return config
 
 
-def _steps_given(result: Result, name: str) -> bool:
-    """Whether the configuration in a result gives the number of steps."""
-    text = stored_text(result, name, "configuration_resolved")
-    config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
-    return config.integration.steps_per_period is not None
-
-
 def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     """Return the configuration of the motion that continues from the end of a lane.
 
@@ -121,7 +123,8 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     ConfigurationError
         If the lane diverged.
     """
-    config, ended = computable(lane, name), lane[f"{begin}_state"].tolist()
+    stored, ended = _stored(lane, name), lane[f"{begin}_state"].tolist()
+    config = _as_computed(stored, lane, name)
     if not np.isfinite(ended).all():
         status = lane.variables["status"].flags[lane["status"]].replace("_", " ")
         raise ConfigurationError(
@@ -135,7 +138,8 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     }.items():
         config = config.replace(key, value)
     method = METHODS.get(config.integration.method)
-    if method is not None and method.exact and not _steps_given(lane, name):
+    given = stored.integration.steps_per_period is not None
+    if method is not None and method.exact and not given:
         # The steps do not change the motion, and a response may need more of them.
         config = config.replace("integration.steps_per_period", None)
     return config.replace("integration.transient_periods", 0) if begin == "end" else config
