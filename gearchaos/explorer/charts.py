@@ -134,11 +134,9 @@ def basin_map(result: Result, found: Basins) -> tuple[Charts, list[GlyphRenderer
 def _circles(line: Line2D) -> GlyphRenderer:
     """Return the markers of a line of matplotlib for a chart of bokeh."""
     x, y = np.asarray(line.get_data(), dtype=float)
-    fill, size = (
-        to_hex(line.get_markerfacecolor()),
-        1.4 * line.get_markersize(),
-    )  # Points to pixels.
-    look = {"fill_color": fill, "size": size, "line_width": line.get_markeredgewidth()}
+    pixels = 1.4 * line.get_markersize()
+    look = {"fill_color": to_hex(line.get_markerfacecolor()), "size": pixels}
+    look |= {"line_width": line.get_markeredgewidth()}
     source = ColumnDataSource({"x": x, "y": y})
     return GlyphRenderer(data_source=source, glyph=Scatter(x="x", y="y", line_color=BLACK, **look))
 
