@@ -122,7 +122,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
     periods = plan.transient_periods + recorded_periods
     if any_stopped(lacked, scene):
         return
-    for period in range(resumed(memory, block, progress, given, scene), periods):
+    for period in range(resumed(memory, block, progress, batch, given, scene), periods):
         if scene.stops is not None:
             keep_progress(memory, block, progress, period, scene)
         recorded = period - plan.transient_periods
@@ -175,7 +175,7 @@ def any_stopped(lacked, scene):
 
 
 @scalar
-def resumed(memory, block, progress, given, scene):
+def resumed(memory, block, progress, batch, given, scene):
     """Restore the memory of a block that was stopped; return the period in which it continues.
 
     ``progress``, shape (1 or 0, numbers): its row of `Share.progress`, if there is one.
@@ -189,7 +189,8 @@ def resumed(memory, block, progress, given, scene):
         copy_progress(progress[0, 1:], memory, block, scene)
         for slot in range(LANES):
             # Its maps may have moved.
-            begin_lane(memory, slot, read_lane(memory, slot, scene), given, scene)
+            index = batch.order[block.first + min(slot, block.lanes - 1)]
+            begin_lane(memory, slot, index, read_lane(memory, slot, scene), given, scene)
     return period
 
 
@@ -247,7 +248,7 @@ def begin(memory, block, batch, given, period, scene):
             state = from_kept(state_of(memory, slot, scene), forcing, scene)
             gaps = gaps_at(state, lane, forcing, scene)
             write_branches(memory, slot, branches_at(gaps, lane, scene), scene)
-        begin_lane(memory, slot, lane, given, scene)
+        begin_lane(memory, slot, index, lane, given, scene)
     return interval
 
 

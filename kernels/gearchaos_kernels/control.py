@@ -325,7 +325,7 @@ def act(memory, block, period, batch, control, given, scene):
         coefficient = batch.coefficients[index, column] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
         memory[control_rows(scene).varied * STRIDE + slot] = strength * varied
-        begin_lane(memory, slot, read_lane(memory, slot, scene), given, scene)
+        begin_lane(memory, slot, index, read_lane(memory, slot, scene), given, scene)
         if slot < block.lanes:
             control.inputs[index, period] = effort
 

@@ -64,6 +64,12 @@ class Crossing(NamedTuple):
 
 
 @scalar
+def always_engaged(_half_clearance):
+    """Return the branch of an element without clearance."""
+    return ContactBranch(1.0, 0.0, -math.inf, math.inf)
+
+
+@scalar
 def branch_at(gap, half_clearance, kind):
     """Return the branch of a gap, given as a number."""
     if kind.one_sided:

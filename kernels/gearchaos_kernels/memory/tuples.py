@@ -1,5 +1,6 @@
 """Arithmetic of records and tuples whose length depends on the scene, unrolled when compiled."""
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -81,3 +82,33 @@ def as_mask(_typing_context: Any, conditions: Any) -> Any:
         return mask
 
     return types.float64(conditions), generate
+
+
+def zeros_of(count: Callable[[Any], int]) -> Any:
+    """Return an intrinsic that returns a tuple of zeros; ``count(scene)``: how many."""
+
+    @intrinsic
+    def zeros(_typing_context: Any, scene: Any) -> Any:
+        returned = types.UniTuple(types.float64, count(scene.scene))
+
+        def generate(context: Any, _builder: Any, _signature: Any, _arguments: Any) -> Any:
+            return context.get_constant_null(returned)
+
+        return returned(scene), generate
+
+    return zeros
+
+
+@intrinsic
+def scaled(_typing_context: Any, record: Any, factor: Any) -> Any:
+    """Return a record of numbers, each of them multiplied by a factor."""
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        given, number = arguments
+        products = [
+            builder.fmul(builder.extract_value(given, field), number, flags=_FLAGS)
+            for field in range(len(record))
+        ]
+        return context.make_tuple(builder, record, products)
+
+    return record(record, types.float64), generate

@@ -61,6 +61,8 @@ class Method:
     traces : bool
         Whether the method follows forces and observed signals along every step by itself, and
         accumulates them in the rows `recorders.loads.accumulated_of`.
+    refuses : callable
+        ``refuses(system)``: why the method cannot integrate a system, or an empty text.
     stops : callable
         ``stops(scene)``: whether blocks stop where lanes lack maps, see `Share.lacked`.
     rows : callable
@@ -95,8 +97,8 @@ class Method:
         Returns how many numbers are prepared for one step.
     workspace(scene)
         Returns what one block needs besides its memory.
-    begin_lane(memory, slot, lane, given, scene)
-        Prepares a lane before its first step.
+    begin_lane(memory, slot, index, lane, given, scene)
+        Prepares a lane before its first step; ``index``: its number among all lanes.
     step(memory, lanes, at, given, scene)
         Takes one step in every slot; returns how many lanes may have left a contact branch.
         ``lanes``: number of lanes of the block; ``at``: the `StepAt`; ``given``: the `StepInputs`.
@@ -110,6 +112,7 @@ class Method:
     flags: Any
     always_resolved: bool
     traces: bool
+    refuses: Callable[[Any], str]
     stops: Callable[[Scene], bool]
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene, Integers], Iterator[Share]]

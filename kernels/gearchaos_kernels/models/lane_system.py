@@ -299,6 +299,19 @@ class LaneSystem(ABC):
         strength: Floats = one - none
         return strength
 
+    def refuses_series(self) -> str:
+        """Return why Taylor series cannot integrate the system, or an empty text."""
+        flags = self.flags()
+        return "" if provider_of(flags).series else "the model has no formulas for Taylor series"
+
+    def fastest_rates(self) -> Floats:
+        """Return the rate of the fastest motion on any contact branch, shape (lanes,).
+
+        It is per unit of tau, and Taylor series converge in a time of this rate. By default it is
+        the bound `growth_rates`.
+        """
+        return self.growth_rates()
+
     # Flow maps use all of the following.
 
     def refuses_maps(self) -> str:

@@ -155,6 +155,8 @@ class Model:
         The observed signals of a state in the coordinates of the equations, a tuple.
     maps : MapFormulas or None
         What flow maps need in addition; None if they cannot integrate the model.
+    series : SeriesFormulas or None
+        What Taylor series need in addition; None if they cannot integrate the model.
     """
 
     coordinates: Any
@@ -188,10 +190,12 @@ class Model:
     switch: Any = defaults.switch_nothing
     observed_at: Any
     maps: "MapFormulas | None" = None
+    series: "SeriesFormulas | None" = None
 
     def function(self, name: str, _scene: Any) -> Any:
         """Return a compiled formula by its name."""
-        owner = self.maps if name in MapFormulas.__annotations__ else self
+        parts = (MapFormulas, self.maps), (SeriesFormulas, self.series)
+        owner = next((part for kind, part in parts if name in kind.__annotations__), self)
         return _compiled(getattr(owner, name))
 
     def present(self, flags: Any) -> tuple[bool, ...]:
@@ -285,3 +289,23 @@ class MapFormulas:
     mobility_forces: Any = defaults.equal_shares
     inputs_of: Any
     mean_gaps: Any = defaults.no_mean_gaps
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeriesFormulas:
+    """The formulas of a model for Taylor series.
+
+    On a contact branch its equations are linear in the state, and linear in the waves. The series
+    of forcing, gaps and accelerations then follow from the model's formulas, term by term.
+
+    Attributes
+    ----------
+    orders : callable
+        ``orders(flags)``: the orders of the harmonics of the mesh phase whose cosine and sine, in
+        this sequence, are the waves: the mesh phase of the model is the tuple of them.
+    part_of_forcing(lane, share, point, scene)
+        What acts on a lane by a share of all that is constant, and by these values of the waves.
+    """
+
+    orders: Callable[[Any], tuple[int, ...]]
+    part_of_forcing: Any

@@ -1,16 +1,15 @@
 """Where numbers are stored: flow maps in their table, lanes that cross in memory aside."""
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import CACHE_LINE
 from gearchaos_kernels.memory.block_memory import numbers_of
 from gearchaos_kernels.memory.rows import constants, rows_of
+from gearchaos_kernels.memory.tuples import zeros_of
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.recorders.loads import signals_of
 from gearchaos_kernels.scene import Scene, provider_of
@@ -27,11 +26,6 @@ made when a lane enters them.
 
 _VECTOR = CACHE_LINE // np.dtype(np.float64).itemsize
 """Numbers of a vector register, and of a cache line."""
-
-
-def fourth_derivative(power: Floats) -> Floats:
-    """Return the largest fourth derivative of powers of s from -1 to 1."""
-    return power * (power - 1.0) * (power - 2.0) * (power - 3.0)
 
 
 class Work(NamedTuple):
@@ -175,15 +169,8 @@ waves_at = numbers_of(lambda scene: layout_of(scene).waves)
 """Read the values of the waves; arguments: array, place of the first one, scene."""
 
 
-@intrinsic
-def no_waves(_typing_context: Any, scene: Any) -> Any:
-    """Return values of 0 for all waves, a tuple."""
-    returned = types.UniTuple(types.float64, layout_of(scene.scene).waves)
-
-    def generate(context: Any, _builder: Any, _signature: Any, _arguments: Any) -> Any:
-        return context.get_constant_null(returned)
-
-    return returned(scene), generate
+no_waves = zeros_of(lambda scene: layout_of(scene).waves)
+"""Return values of 0 for all waves, a tuple; argument: scene."""
 
 
 class LastCrossing(NamedTuple):

@@ -30,7 +30,7 @@ from gearchaos_kernels.methods.flow_map.store import (
 )
 from gearchaos_kernels.methods.flow_map.tracing import trace_block
 from gearchaos_kernels.methods.protocol import Integers, Method, Share, cut
-from gearchaos_kernels.models.interfaces import grid_within
+from gearchaos_kernels.methods.substeps import grids
 from gearchaos_kernels.plan import Plan
 from gearchaos_kernels.scene import Scene, implement
 
@@ -92,21 +92,12 @@ def step(memory, lanes, at, given, scene):
     return suspects
 
 
-@scalar
-def grids(clock, given, scene):
-    """Return what all lanes share at the beginning, in the middle and at the end of a step."""
-    requested, substep = clock.number // clock.substeps, clock.number % clock.substeps
-    begin = grid_within(given.tables, requested, substep / clock.substeps, scene)
-    middle = grid_within(given.tables, requested, (substep + 0.5) / clock.substeps, scene)
-    end = grid_within(given.tables, requested, (substep + 1.0) / clock.substeps, scene)
-    return begin, middle, end
-
-
 FLOW_MAP = Method(
     name="flow_map",
     flags=FlowMap,
     always_resolved=True,
     traces=True,
+    refuses=lambda system: str(system.refuses_maps()),
     stops=lambda scene: bool(layout_of(scene).on_demand),
     rows=rows_needed,
     prepare=prepare,

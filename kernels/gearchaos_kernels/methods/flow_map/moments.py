@@ -10,26 +10,24 @@ import math
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.contact.kinds import kinds
-from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER, falling_root
+from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER
+from gearchaos_kernels.contact.searching import (
+    bounds_of,
+    first_below,
+    guess_fall,
+    largest_bend,
+)
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store
 from gearchaos_kernels.memory.rows import STRIDE, VECTOR, rows
 from gearchaos_kernels.methods.flow_map.layout import (
     TERMS,
     GapSearch,
     aside_rows,
-    fourth_derivative,
 )
 from gearchaos_kernels.models.interfaces import half_clearances, mean_gaps
 
-largest_bend = scalar(fourth_derivative)
-
-_THIRD = 1.0 / 3.0
 UNKNOWN = -2.0
 """Marks a moment that still has to be searched."""
-
-_MOST_PIECES = 300
-_SHORTEST = 1e-9
-"""In a shorter piece of a step, a gap that turns around changes by less than rounding."""
 
 
 @scalar
@@ -125,34 +123,6 @@ def refined_fall(aside, first, raised, at):
 
 
 @scalar
-def bounds_of(ends, width, bend):
-    """Return a lower and an upper bound of a gap within a piece, and an upper one of its slope.
-
-    ``ends``: value and slope on the left and on the right; ``bend``: bound on the fourth
-    derivative. The gap differs from the cubic by at most bend (width^4 / 24) t^2 (1 - t)^2.
-    """
-    value_left, slope_left, value_right, slope_right = ends
-    point1 = value_left + _THIRD * width * slope_left
-    point2 = value_right - _THIRD * width * slope_right
-    stray = bend * width**4 / 24.0
-    steepest = max(max(width * slope_left, 3.0 * (point2 - point1)), width * slope_right)
-    # The slopes of gap and cubic differ by less than 0.2 stray.
-    lowest, highest = min(point1, point2), max(point1, point2)
-    return lowest - stray / 12.0, highest + stray / 12.0, steepest + 0.2 * stray
-
-
-@scalar
-def guess_fall(ends, width):
-    """Estimate where in a piece a gap falls below 0, by inverse cubic interpolation."""
-    value_left, slope_left, value_right, slope_right = ends
-    fallen = value_left - value_right
-    done = value_left / fallen
-    early = (1.0 - done) * (-fallen / slope_left - width)
-    late = done * (-fallen / slope_right - width)
-    return width * done + done * (1.0 - done) * (early - late)
-
-
-@scalar
 def gap_along(aside, first, at):
     """Return value, slope and half the curvature of a gap; ``first``: the place of its terms."""
     # Even and odd terms are summed independently, so that they do not wait for each other.
@@ -178,52 +148,14 @@ def find_in_pieces(aside, element, n, scene):
     first = (at_rows.gaps + element * at_rows.gap_rows) * STRIDE + n
     side, distance = aside[first + at_rows.side * STRIDE], aside[first + at_rows.distance * STRIDE]
     after, bend = aside[at_rows.after * STRIDE + n], aside[first + at_rows.bend * STRIDE]
-    moment = first_below((aside, first, side, distance), bend, after)
+    moment = first_below(gap_at, (aside, first, side, distance), bend, after, 1.0)
     if distance > 0.0 and not kinds(scene)[element].one_sided:
         # A lane between the flanks may meet either flank.
-        moment = min(moment, first_below((aside, first, -side, distance), bend, after))
+        moment = min(moment, first_below(gap_at, (aside, first, -side, distance), bend, after, 1.0))
     value, slope, _ = gap_along(aside, first, moment)
     aside[first + at_rows.moment * STRIDE] = moment
     aside[first + at_rows.crossed * STRIDE] = value
     aside[first + (at_rows.crossed + 1) * STRIDE] = slope
-
-
-@part
-def first_below(given, bend, left):
-    """Return where side * gap + distance first falls below zero after a moment, or `NEVER`.
-
-    Piece by piece. A piece whose lower bound is not negative has no such place. In a piece that is
-    monotonically decreasing, Newton's method finds it. Other pieces are halved.
-    """
-    value_left, slope_left = gap_at(given, left)
-    value_left = max(value_left, 0.0)
-    right = 1.0
-    value_right, slope_right = gap_at(given, right)
-    for _ in range(_MOST_PIECES):
-        width = right - left
-        ends = value_left, slope_left, value_right, slope_right
-        lowest, _, steepest = bounds_of(ends, width, bend)
-        clear = lowest >= 0.0 and value_right >= 0.0
-        if not clear:
-            if steepest < 0.0 and value_right < 0.0:
-                guess = min(max(left + guess_fall(ends, width), left), right)
-                return falling_root(gap_at, given, left, right, guess)
-            clear = steepest < 0.0
-            if not clear and width < _SHORTEST:
-                if value_right < 0.0:
-                    return right
-                clear = True
-        if clear:
-            if right >= 1.0:
-                return NEVER
-            left = right
-            value_left = max(value_right, 0.0)
-            slope_left = slope_right
-            right = min(1.0, left + 2.0 * width)
-        else:
-            right = left + 0.5 * width
-        value_right, slope_right = gap_at(given, right)
-    return NEVER
 
 
 @scalar

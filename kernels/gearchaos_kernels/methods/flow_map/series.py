@@ -11,6 +11,7 @@ from numpy.polynomial import chebyshev
 from gearchaos_kernels.compilation import driver, evaluator, part, scalar
 from gearchaos_kernels.contact.elements import Push
 from gearchaos_kernels.contact.kinds import kinds
+from gearchaos_kernels.contact.searching import fourth_derivative
 from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill_lane,
@@ -20,7 +21,7 @@ from gearchaos_kernels.memory.block_memory import (
 )
 from gearchaos_kernels.memory.rows import STATE, STRIDE, State, rows
 from gearchaos_kernels.memory.tuples import each
-from gearchaos_kernels.methods.flow_map.layout import TERMS, fourth_derivative, layout, waves_at
+from gearchaos_kernels.methods.flow_map.layout import TERMS, layout, waves_at
 from gearchaos_kernels.methods.flow_map.signals import (
     add_dampers,
     differentiate_signals,

@@ -4,10 +4,8 @@ A lane takes a step by the map of the contact branches on which it begins. Lanes
 left their branches are suspects; `crossings` resolves their step.
 """
 
-import math
-
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact.branches import suspects_of
+from gearchaos_kernels.contact.branches import always_engaged, suspects_of
 from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
@@ -20,7 +18,6 @@ from gearchaos_kernels.memory.rows import (
     STATE,
     STRIDE,
     VECTOR,
-    ContactBranch,
     State,
     rows,
 )
@@ -49,7 +46,7 @@ def points_of(maps, maps_at, scene):
 
 
 @scalar
-def begin_lane(memory, slot, lane, given, scene):
+def begin_lane(memory, slot, index, lane, given, scene):
     """Store the inputs of a lane and the offsets of its branches, in the order of map columns."""
     place, first = layout(scene), method_rows(scene).inputs
     inputs = inputs_of(lane, scene)
@@ -78,12 +75,6 @@ def store_means(memory, slot, lane, scene):
         memory[(first + element) * STRIDE + slot] = 0.0
     constant = observed_at(nothing, lane, point_of_waves(no_waves(scene), scene), scene)
     store(memory, first + layout(scene).elements, slot, constant)
-
-
-@scalar
-def always_engaged(_half_clearance):
-    """Return the branch of an element without clearance."""
-    return ContactBranch(1.0, 0.0, -math.inf, math.inf)
 
 
 @scalar

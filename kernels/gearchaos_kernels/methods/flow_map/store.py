@@ -37,6 +37,7 @@ from gearchaos_kernels.methods.flow_map.series import (
     differentiate,
     make_maps,
 )
+from gearchaos_kernels.methods.substeps import multiple_of
 from gearchaos_kernels.plan import MAP_BYTES, Floats, Plan
 from gearchaos_kernels.scene import Scene, provider_of
 from gearchaos_kernels.turns import in_turn
@@ -56,14 +57,10 @@ SETS_VISITED = 4
 MAKING_ON_DEMAND, READING_ON_DEMAND, MOVING_ON_DEMAND = 1_500.0 * SETS_VISITED, 6.0, 1.0
 """The same times where maps are made on demand, medians of a planetary set of 34 states."""
 
-FEWEST_RECORDED = 240
-"""Fewest steps per period if recorders read the end of every step: they interpolate."""
-
 
 def fewest_steps(plan: Plan) -> int:
     """Return the fewest steps per period that maps may have, a multiple of those requested."""
-    least = FEWEST_RECORDED if plan.records_steps else 1
-    return plan.steps_per_period * -(-least // plan.steps_per_period)
+    return multiple_of(plan.steps_per_period, plan.records_steps)
 
 
 def sharing(system: Any) -> NDArray[np.intp]:

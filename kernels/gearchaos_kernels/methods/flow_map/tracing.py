@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.rows import STRIDE, VECTOR, constants, rows
+from gearchaos_kernels.memory.vector_code import FLAGS
 from gearchaos_kernels.methods.flow_map.layout import (
     TERMS,
     layout,
@@ -23,7 +24,7 @@ from gearchaos_kernels.methods.flow_map.layout import (
     method_rows,
     method_rows_of,
 )
-from gearchaos_kernels.methods.flow_map.vectors import _FLAGS, _inputs, _on_branches, _Writer
+from gearchaos_kernels.methods.flow_map.vectors import _inputs, _on_branches, _Writer
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 
 _POINTS = 9
@@ -199,7 +200,7 @@ class _Piece:
             below = w.add(
                 w.times(double, double), w.negative(w.times(w.times(slope, twist), w.constant(3.0)))
             )
-            step = w.builder.fdiv(w.times(slope, double), below, flags=_FLAGS)
+            step = w.builder.fdiv(w.times(slope, double), below, flags=FLAGS)
             at = w.add(at, w.negative(step))
             # A place that is not a number becomes the begin of the piece.
             at = w.choose(w.greater(at, self.begin), at, self.begin)

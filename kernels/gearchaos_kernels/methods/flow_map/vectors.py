@@ -8,7 +8,7 @@ Where maps are made on demand, there are more than two elements, and often many 
 is then a loop over states, elements or terms, because it would be too long to compile otherwise.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from llvmlite import ir
@@ -16,7 +16,6 @@ from numba import types
 from numba.core.cgutils import for_range
 from numba.extending import intrinsic
 
-from gearchaos_kernels.compilation import FASTMATH, first_element
 from gearchaos_kernels.memory.rows import (
     BRANCH,
     STATE,
@@ -25,12 +24,10 @@ from gearchaos_kernels.memory.rows import (
     control_rows_of,
     rows_of,
 )
+from gearchaos_kernels.memory.vector_code import DOUBLE, FLAGS, INTEGER, VectorCode
 from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_of, layout_of, method_rows_of
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 from gearchaos_kernels.scene import Scene, provider_of
-
-_DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
-_FLAGS = tuple(sorted(FASTMATH))
 
 
 def _inputs(scene: Scene) -> list[int]:
@@ -48,62 +45,13 @@ def _tangent_inputs(scene: Scene) -> list[int]:
     return [*range(first, first + layout_of(scene).states), *varied]
 
 
-class _Writer:
-    """Generates the instructions of one function: loads, stores and sums of vectors."""
-
-    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
-        self.context, self.builder = context, builder
-        self.arguments = tuple(zip(signature.args, arguments, strict=True))
-
-    def element(self, number: int, at: Any) -> Any:
-        """Return the address of an element of an array; ``number``: which argument it is."""
-        kind, array = self.arguments[number]
-        first = first_element(self.context, self.builder, kind, array)
-        return self.builder.gep(first, [at])
-
-    def moved(self, pointer: Any, count: Any, stride: int = 1) -> Any:
-        """Return an address, count * stride numbers further; ``count`` is known at run time."""
-        return self.builder.gep(pointer, [self.builder.mul(count, _INTEGER(stride))])
-
-    def load(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
-        """Load a vector that begins ``at`` numbers after an address."""
-        kind = ir.VectorType(_DOUBLE, width).as_pointer()
-        place = self.builder.gep(pointer, [_INTEGER(at)])
-        return self.builder.load(self.builder.bitcast(place, kind), align=8)
-
-    def store(self, value: Any, pointer: Any, at: int) -> None:
-        """Store a vector that begins ``at`` numbers after an address."""
-        place = self.builder.gep(pointer, [_INTEGER(at)])
-        self.builder.store(value, self.builder.bitcast(place, value.type.as_pointer()), align=8)
-
-    def rows(self, vector: Any, numbers: Iterable[int]) -> list[Any]:
-        """Load rows of eight lanes."""
-        return [self.load(vector, row * STRIDE) for row in numbers]
-
-    def put(self, value: Any, vector: Any, row: int, mask: Any) -> None:
-        """Store a row of eight lanes, or of the lanes of a mask."""
-        if mask is not None:
-            value = self.builder.select(mask, value, self.load(vector, row * STRIDE))
-        self.store(value, vector, row * STRIDE)
-
-    def equal(self, vector: Any, row: int, number: float) -> Any:
-        """Return the mask of those of eight lanes in which a row equals a number."""
-        given = self.load(vector, row * STRIDE)
-        return self.builder.fcmp_ordered("==", given, self.constant(number))
-
-    def bits(self, mask: Any) -> Any:
-        """Return a mask of eight lanes as an integer, a bit for each of them."""
-        return self.builder.bitcast(mask, ir.IntType(VECTOR))
-
-    def any(self, mask: Any) -> Any:
-        """Return whether a mask contains any of eight lanes."""
-        bits = self.bits(mask)
-        return self.builder.icmp_unsigned("!=", bits, bits.type(0))
+class _Writer(VectorCode):
+    """Generates the instructions of one function of flow maps."""
 
     def suspects(self, sums: Any, element: Any) -> Any:
         """Return the mask of the lanes in which an element is a suspect; see `Rows.suspect`."""
-        numbers = self.builder.fptoui(sums, ir.VectorType(_INTEGER, VECTOR))
-        bit = self.splat(self.builder.shl(_INTEGER(1), element), of=_INTEGER)
+        numbers = self.builder.fptoui(sums, ir.VectorType(INTEGER, VECTOR))
+        bit = self.splat(self.builder.shl(INTEGER(1), element), of=INTEGER)
         found = self.builder.and_(numbers, bit)
         return self.builder.icmp_unsigned("!=", found, ir.Constant(found.type, None))
 
@@ -115,76 +63,12 @@ class _Writer:
         """
         mask = None
         for element, there in enumerate(engaged):
-            bit = self.builder.and_(number, _INTEGER(1 << element))
-            apart = self.builder.icmp_unsigned("!=", bit, _INTEGER(0))
+            bit = self.builder.and_(number, INTEGER(1 << element))
+            apart = self.builder.icmp_unsigned("!=", bit, INTEGER(0))
             expected = self.builder.select(apart, self.constant(0.0), self.constant(1.0))
             those = self.builder.fcmp_ordered("==", there, expected)
             mask = those if mask is None else self.builder.and_(mask, those)
         return mask
-
-    def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
-        """Load a number and return a vector whose components all equal it."""
-        return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
-
-    def splat(self, number: Any, width: int = VECTOR, of: Any = _DOUBLE) -> Any:
-        """Return a vector whose components all equal a number."""
-        nothing = ir.Constant(ir.VectorType(of, width), ir.Undefined)
-        first = self.builder.insert_element(nothing, number, _INDEX(0))
-        order = ir.Constant(ir.VectorType(_INDEX, width), [_INDEX(0)] * width)
-        return self.builder.shuffle_vector(first, nothing, order)
-
-    def constant(self, number: float) -> Any:
-        """Return a vector whose components all equal a constant."""
-        return ir.Constant(ir.VectorType(_DOUBLE, VECTOR), [number] * VECTOR)
-
-    def add(self, a: Any, b: Any) -> Any:
-        """Return a + b."""
-        return self.builder.fadd(a, b, flags=_FLAGS)
-
-    def times(self, a: Any, b: Any) -> Any:
-        """Return a b."""
-        return self.builder.fmul(a, b, flags=_FLAGS)
-
-    def negative(self, a: Any) -> Any:
-        """Return -a."""
-        return self.builder.fneg(a, flags=_FLAGS)
-
-    def greater(self, a: Any, b: Any) -> Any:
-        """Return the mask of the components in which a exceeds b."""
-        return self.builder.fcmp_ordered(">", a, b)
-
-    def smaller(self, a: Any, b: Any) -> Any:
-        """Return the mask of the components in which b exceeds a."""
-        return self.builder.fcmp_ordered("<", a, b)
-
-    def choose(self, mask: Any, a: Any, b: Any) -> Any:
-        """Return a where a mask is true, and b elsewhere."""
-        return self.builder.select(mask, a, b)
-
-    def size(self, vector: Any) -> Any:
-        """Return the absolute values of the components of a vector."""
-        kind = vector.type
-        name = f"llvm.fabs.v{kind.count}f64"
-        module = self.builder.module
-        declared = module.globals.get(name)
-        fabs = declared or ir.Function(module, ir.FunctionType(kind, [kind]), name)
-        return self.builder.call(fabs, [vector])
-
-    def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
-        """Return a b + c, or a b if c is None."""
-        product = self.builder.fmul(a, b, flags=_FLAGS)
-        return product if c is None else self.builder.fadd(product, c, flags=_FLAGS)
-
-    def sum(self, factors: Iterable[tuple[int, Any]], terms: Sequence[Any]) -> Any:
-        """Return a sum of products as two partial sums, which the processor runs in parallel.
-
-        One is over even numbers, the other over odd ones, so that leaving out columns of zeros
-        changes no bit.
-        """
-        parts: list[Any] = [None, None]
-        for number, factor in factors:
-            parts[number % 2] = self.multiply_add(factor, terms[number], parts[number % 2])
-        return self.builder.fadd(*parts, flags=_FLAGS)
 
     def slopes(
         self, terms: list[Any], powers: dict[int, Any], integrals: list[Any], deviates: bool
@@ -194,7 +78,7 @@ class _Writer:
         ``deviates``: whether the value of the polynomial at the end, times s^k, is subtracted.
         """
         scaled = [(j, self.constant(float(j))) for j in range(1, TERMS)]
-        slope = [self.builder.fmul(terms[j], factor, flags=_FLAGS) for j, factor in scaled]
+        slope = [self.builder.fmul(terms[j], factor, flags=FLAGS) for j, factor in scaled]
         value = self.sum(enumerate(terms), [powers[j] for j in range(TERMS)])
         end = self.builder.fneg(value)
         for k in range(TERMS):
@@ -224,9 +108,9 @@ def bound_bends(_typing, memory, slot, maps, maps_at, scene):
     place, margins = layout_of(scene.scene), method_rows_of(scene.scene).margins
 
     def apply(w, vector, branch_maps, mask):
-        header = w.builder.gep(branch_maps, [_INTEGER(-place.header)])
+        header = w.builder.gep(branch_maps, [INTEGER(-place.header)])
         sizes = [w.size(given) for given in w.rows(vector, _inputs(scene.scene))]
-        with for_range(w.builder, _INTEGER(place.elements)) as loop:
+        with for_range(w.builder, INTEGER(place.elements)) as loop:
             bounds = w.moved(header, loop.index, place.bound_size)
             bends = [w.spread(bounds, place.bounds + column) for column in range(len(sizes))]
             value = w.sum(enumerate(bends), sizes)
@@ -264,7 +148,7 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         vector = w.element(0, arguments[1])
-        maps = builder.add(arguments[3], _INTEGER(place.header))
+        maps = builder.add(arguments[3], INTEGER(place.header))
         if place.branches == 1:
             apply(w, vector, w.element(2, maps), None)
             return context.get_dummy_value()
@@ -273,11 +157,11 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
             engaged = [w.load(vector, (first + BRANCH * n) * STRIDE) for n in range(place.elements)]
             mask = w.on_branches(number, engaged)
             with builder.if_then(w.any(mask)):
-                at = builder.add(maps, builder.mul(number, _INTEGER(place.size)))
+                at = builder.add(maps, builder.mul(number, INTEGER(place.size)))
                 apply(w, vector, w.element(2, at), mask)
 
         for number in range(place.branches):
-            apply_on(_INTEGER(number))
+            apply_on(INTEGER(number))
         return context.get_dummy_value()
 
     return generate
@@ -302,13 +186,13 @@ def _on_own_maps(scene: Scene, apply: Any) -> Any:
         builder.branch(body)
         builder.position_at_end(body)
         left = builder.load(waiting)
-        lane = builder.zext(builder.cttz(left, ir.IntType(1)(1)), _INTEGER)
-        own = builder.load(builder.gep(vector, [builder.add(lane, _INTEGER(row * STRIDE))]))
+        lane = builder.zext(builder.cttz(left, ir.IntType(1)(1)), INTEGER)
+        own = builder.load(builder.gep(vector, [builder.add(lane, INTEGER(row * STRIDE))]))
         mask = builder.fcmp_ordered("==", places, w.splat(own))
         left = builder.and_(left, builder.not_(w.bits(mask)))
         builder.store(left, waiting)
-        at = builder.add(arguments[3], builder.fptosi(own, _INTEGER))
-        apply(w, vector, w.element(2, builder.add(at, _INTEGER(place.header))), mask)
+        at = builder.add(arguments[3], builder.fptosi(own, INTEGER))
+        apply(w, vector, w.element(2, builder.add(at, INTEGER(place.header))), mask)
         builder.cbranch(builder.icmp_unsigned("!=", left, left.type(0)), body, done)
         builder.position_at_end(done)
         return context.get_dummy_value()
@@ -334,15 +218,15 @@ def move(_typing, memory, slot, maps, maps_at, scene):
     def apply(w, vector, branch_maps, mask):
         given = inputs_of(w, vector)
         if place.on_demand:
-            with for_range(w.builder, _INTEGER(place.states)) as loop:
+            with for_range(w.builder, INTEGER(place.states)) as loop:
                 line_maps = w.moved(branch_maps, loop.index)
                 line_of_lanes = w.moved(vector, loop.index, STRIDE)
                 compute(w, given, line_maps, range(place.columns), (line_of_lanes, mask))
             return
         for line in range(place.states):
             acting = [n for n in range(place.columns) if line in states or n not in columns]
-            lines = w.builder.gep(branch_maps, [_INTEGER(line)])
-            line_of_lanes = w.builder.gep(vector, [_INTEGER(line * STRIDE)])
+            lines = w.builder.gep(branch_maps, [INTEGER(line)])
+            line_of_lanes = w.builder.gep(vector, [INTEGER(line * STRIDE)])
             compute(w, given, lines, acting, (line_of_lanes, mask))
 
     def compute(w, given, line_maps, acting, lanes):
@@ -368,22 +252,22 @@ def compute_gaps(_typing, aside, slot, maps, maps_at, scene):
         given = {0: w.rows(vector, _inputs(scene.scene))}
         if scene.scene.tangent is not None:
             given[at.tangent_terms] = w.rows(vector, _tangent_inputs(scene.scene))
-        gaps = w.builder.gep(branch_maps, [_INTEGER(place.gap)])
-        rows = w.builder.gep(vector, [_INTEGER(at.gaps * STRIDE)])
+        gaps = w.builder.gep(branch_maps, [INTEGER(place.gap)])
+        rows = w.builder.gep(vector, [INTEGER(at.gaps * STRIDE)])
         if place.on_demand:
-            with for_range(w.builder, _INTEGER(place.elements)) as loop:
+            with for_range(w.builder, INTEGER(place.elements)) as loop:
                 suspects = w.suspects(w.load(vector, suspect * STRIDE), loop.index)
                 with w.builder.if_then(w.any(w.builder.and_(suspects, mask))):
                     terms = w.moved(gaps, loop.index, place.columns * TERMS)
                     first = w.moved(rows, loop.index, at.gap_rows * STRIDE)
-                    with for_range(w.builder, _INTEGER(TERMS)) as term:
+                    with for_range(w.builder, INTEGER(TERMS)) as term:
                         row = w.moved(first, term.index, STRIDE)
                         compute(w, given, w.moved(terms, term.index), (row, mask))
             return
         for element in range(place.elements):
             for term in range(TERMS):
-                terms = w.builder.gep(gaps, [_INTEGER(element * place.columns * TERMS + term)])
-                row = w.builder.gep(rows, [_INTEGER((element * at.gap_rows + term) * STRIDE)])
+                terms = w.builder.gep(gaps, [INTEGER(element * place.columns * TERMS + term)])
+                row = w.builder.gep(rows, [INTEGER((element * at.gap_rows + term) * STRIDE)])
                 compute(w, given, terms, (row, mask))
 
     def compute(w, given, terms, lanes):
@@ -414,12 +298,12 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
             given[block.tangent_before] = w.rows(vector, sums)
         if place.on_demand:
             elements = w.load(vector, at.element * STRIDE)
-            with for_range(w.builder, _INTEGER(place.elements)) as loop:
-                number = w.splat(w.builder.sitofp(loop.index, _DOUBLE))
+            with for_range(w.builder, INTEGER(place.elements)) as loop:
+                number = w.splat(w.builder.sitofp(loop.index, DOUBLE))
                 those = w.builder.and_(mask, w.builder.fcmp_ordered("==", elements, number))
                 with w.builder.if_then(w.any(those)):
                     terms = w.moved(branch_maps, loop.index, TERMS * place.width)
-                    with for_range(w.builder, _INTEGER(place.states)) as line:
+                    with for_range(w.builder, INTEGER(place.states)) as line:
                         row = w.moved(vector, line.index, STRIDE)
                         add(w, given, (w.moved(terms, line.index), parts), (row, those))
             return
@@ -428,8 +312,8 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
             if place.elements > 1:
                 those = w.builder.and_(mask, w.equal(vector, at.element, float(element)))
             for line in range(place.states):
-                terms = w.builder.gep(branch_maps, [_INTEGER(element * TERMS * place.width + line)])
-                row = w.builder.gep(vector, [_INTEGER(line * STRIDE)])
+                terms = w.builder.gep(branch_maps, [INTEGER(element * TERMS * place.width + line)])
+                row = w.builder.gep(vector, [INTEGER(line * STRIDE)])
                 add(w, given, (terms, parts), (row, those))
 
     def add(w, given, maps, lanes):
@@ -438,7 +322,7 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
         factors = [(k, w.spread(terms, start)) for k, start in enumerate(starts)]
         for target, sums in given.items():
             before = w.load(lanes[0], target * STRIDE)
-            value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
+            value = w.builder.fadd(before, w.sum(factors, sums), flags=FLAGS)
             w.put(value, lanes[0], target, lanes[1])
 
     given = aside, types.intp, maps, types.intp, scene
@@ -458,7 +342,7 @@ def sum_along(_typing, aside, scene):
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        vector = w.element(0, _INTEGER(0))
+        vector = w.element(0, INTEGER(0))
         after, factor, edge = w.rows(vector, (at.after, at.factor, at.edge))
         powers, integrals = {0: w.constant(1.0), 1: after}, []
         for n in range(1, 2 * TERMS):
@@ -477,14 +361,14 @@ def sum_along(_typing, aside, scene):
                 those = w.equal(vector, at.element, float(element))
                 terms = [builder.select(those, *pair) for pair in zip(others, terms, strict=True)]
             if source == 0:
-                terms[0] = builder.fsub(terms[0], edge, flags=_FLAGS)
+                terms[0] = builder.fsub(terms[0], edge, flags=FLAGS)
             for k in range(TERMS):
                 value = w.sum(enumerate(terms), integrals[k:])
-                w.put(builder.fmul(value, factor, flags=_FLAGS), vector, target + k, None)
+                w.put(builder.fmul(value, factor, flags=FLAGS), vector, target + k, None)
             if place.damper < place.signal:
-                twice = builder.fmul(factor, w.constant(2.0), flags=_FLAGS)
+                twice = builder.fmul(factor, w.constant(2.0), flags=FLAGS)
                 for k, value in enumerate(w.slopes(terms, powers, integrals, source != 0)):
-                    rate = builder.fmul(value, twice, flags=_FLAGS)
+                    rate = builder.fmul(value, twice, flags=FLAGS)
                     w.put(rate, vector, target + TERMS + k, None)
         return context.get_dummy_value()
 
@@ -513,7 +397,7 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
         w = _Writer(context, builder, signature, arguments)
         source, target = w.element(0, arguments[1]), w.element(2, arguments[3])
         for row in copied:
-            at_row = [_INTEGER(row * STRIDE)]
+            at_row = [INTEGER(row * STRIDE)]
             number = builder.load(builder.gep(source, at_row))
             builder.store(number, builder.gep(target, at_row))
         return context.get_dummy_value()
@@ -531,7 +415,7 @@ def margins_of(_typing, memory, slot, scene):
         w = _Writer(context, builder, signature, arguments)
         lane = w.element(0, arguments[1])
         found = [
-            builder.load(builder.gep(lane, [_INTEGER((first + element) * STRIDE)]))
+            builder.load(builder.gep(lane, [INTEGER((first + element) * STRIDE)]))
             for element in range(count)
         ]
         return context.make_tuple(builder, margins, found)

@@ -69,7 +69,7 @@ def workspace(scene):
 
 
 @scalar
-def begin_lane(memory, slot, lane, given, scene):
+def begin_lane(memory, slot, index, lane, given, scene):
     """Prepare nothing."""
 
 
@@ -144,6 +144,7 @@ RK4 = Method(
     flags=Rk4,
     always_resolved=False,
     traces=False,
+    refuses=lambda _system: "",
     stops=lambda _scene: False,
     rows=lambda _scene: 0,
     prepare=prepare,

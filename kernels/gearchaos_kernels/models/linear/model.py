@@ -12,9 +12,16 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.memory.tuples import each, zeros_of
 from gearchaos_kernels.models.linear.structure import Structure, numbered, places_of
-from gearchaos_kernels.models.protocol import Element, ElementKind, Gap, MapFormulas, Model
+from gearchaos_kernels.models.protocol import (
+    Element,
+    ElementKind,
+    Gap,
+    MapFormulas,
+    Model,
+    SeriesFormulas,
+)
 from gearchaos_kernels.models.sums import Terms, sums
 from gearchaos_kernels.models.waves import waves_in_row, waves_within
 from gearchaos_kernels.plan import Floats
@@ -206,23 +213,21 @@ def point_within(memory, slot, table, number, fraction, scene):
 @scalar
 def forcing_at(lane, point, scene):
     """Return what acts on a lane at these values of the waves."""
+    return part_of_forcing(lane, 1.0, point, scene)
+
+
+@scalar
+def part_of_forcing(lane, share, point, scene):
+    """Return what a share of all that is constant, and these values of waves, do to a lane."""
     return Forcing(
-        _forces(lane, scene, 1.0, point, _added(lane, scene)),
-        _stiffnesses(lane, scene, 1.0, point),
-        _motions(lane, scene, 1.0, point),
-        _motion_rates(lane, scene, 1.0, point),
+        _forces(lane, scene, share, point, share * _added(lane, scene)),
+        _stiffnesses(lane, scene, share, point),
+        _motions(lane, scene, share, point),
+        _motion_rates(lane, scene, share, point),
     )
 
 
-@intrinsic
-def _no_waves(_typing_context: Any, scene: Any) -> Any:
-    """Return values of 0 for all waves."""
-    returned = types.UniTuple(types.float64, scene.scene.model.structure.waves)
-
-    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        return context.get_constant_null(returned)
-
-    return returned(scene), generate
+_no_waves = zeros_of(lambda scene: scene.model.structure.waves)
 
 
 @scalar
@@ -432,6 +437,7 @@ def model_of(flags: Linear) -> Model:
             inputs_of=inputs_of,
             mean_gaps=mean_gaps,
         ),
+        series=SeriesFormulas(orders=lambda flags: flags.orders, part_of_forcing=part_of_forcing),
     )
 
 

@@ -197,6 +197,21 @@ class LinearSystems(LaneSystem):
         rates: Floats = np.sqrt(springs.max(axis=1)) + dampers.max(axis=1)
         return rates
 
+    def fastest_rates(self) -> Floats:
+        """Return the rate of the fastest motion: of the stiffest branch, and of the excitation.
+
+        It is the largest natural frequency with all elements in contact at their stiffest, plus
+        the largest rate of damping, plus that of the highest harmonic.
+        """
+        engaged = self.reaction * self._stiffest()[:, np.newaxis]
+        springs = self.position + engaged @ self.gap
+        dampers = self.rate + (self.reaction * self.damping[:, np.newaxis]) @ self.gap
+        return (
+            np.sqrt(_largest_eigenvalues(springs))
+            + _largest_eigenvalues(dampers)
+            + self.harmonics() * self.frequency
+        )
+
     def _stiffest(self) -> Floats:
         """Return an upper bound of the stiffness of each element, shape (lanes, elements)."""
         bound: Floats = np.abs(self.stiffness).sum(axis=2)
@@ -302,3 +317,13 @@ class LinearSystems(LaneSystem):
     def _parameters(self) -> list[str]:
         """Return the names of the fields that are arrays over the lanes."""
         return [one.name for one in fields(self) if isinstance(getattr(self, one.name), np.ndarray)]
+
+
+def _largest_eigenvalues(matrices: Floats) -> Floats:
+    """Return the largest size of an eigenvalue of each matrix, (lanes,); NaN if not finite."""
+    found = np.full(len(matrices), np.nan)
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    different, lanes = np.unique(matrices[finite], axis=0, return_inverse=True)
+    sizes = np.abs(np.linalg.eigvals(different)).max(axis=1, initial=0.0)
+    found[finite] = sizes[lanes.reshape(-1)]
+    return found

@@ -1,0 +1,1 @@
+"""Taylor series: pieces of steps up to the next crossing, for systems of many elements."""
