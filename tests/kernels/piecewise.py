@@ -8,12 +8,30 @@ divided out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from gearchaos_kernels.models.linear.system import LinearSystems
 from scipy.integrate import solve_ivp
 
 TOLERANCE = 1e-13
+
+SIZES = [(1, 1), (3, 2), (6, 4)]
+SIZES_OF_MAPS = [(1, 1, 6), (3, 2, 6), (5, 6, 4)]
+"""Coordinates, elements, and number of machines.
+
+Among more machines with six elements there are some whose reference has 1e-10 only.
+"""
+
+PERIODS = 3
+WITH_LOADS = {
+    "transient_periods": 0,
+    "recorded_periods": PERIODS,
+    "section_points": PERIODS,
+    "tangent": True,
+    "contact": True,
+    "loads": True,
+}
 
 
 @dataclass
@@ -199,3 +217,20 @@ def lanes_of(machines: list[Piecewise]) -> LinearSystems:
 def alternating(z: np.ndarray, size: int) -> np.ndarray:
     """Return displacements, then rates, in the order of lanes: each rate after its displacement."""
     return np.stack([z[..., :size], z[..., size : 2 * size]], axis=-1).reshape(*z.shape[:-1], -1)
+
+
+@cache
+def exact(coordinates, elements, count=6):
+    """Return machines with their start, their motion and growth, computed independently."""
+    machines = [random_machine(seed, coordinates, elements) for seed in range(count)]
+    starts, sections, growths, crossings = [], [], [], []
+    for seed, machine in enumerate(machines):
+        start = np.random.default_rng(seed).normal(size=2 * coordinates) * 0.5
+        tangent = np.full(2 * coordinates, 1.0 / np.sqrt(2 * coordinates))
+        found, crossed = machine.periods(np.concatenate([start, tangent]), PERIODS)
+        lengths = np.linalg.norm(found[:, 2 * coordinates :], axis=1)
+        starts.append(alternating(start, coordinates))
+        sections.append(alternating(found[:, : 2 * coordinates], coordinates))
+        growths.append(np.diff(np.log(lengths), prepend=0.0))
+        crossings.append(crossed)
+    return machines, np.array(starts), np.array(sections), np.array(growths), np.array(crossings)

@@ -1,7 +1,6 @@
 """Piecewise-linear systems of any size against an adaptive method with events."""
 
 from dataclasses import replace
-from functools import cache
 
 import numba
 import numpy as np
@@ -13,42 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from .oscillator import Oscillators
-from .piecewise import alternating, lanes_of, random_machine
+from .piecewise import (
+    PERIODS,
+    SIZES,
+    SIZES_OF_MAPS,
+    WITH_LOADS,
+    alternating,
+    exact,
+    lanes_of,
+    random_machine,
+)
 from .reference import assert_same_bits, lanes_out_of
-
-SIZES = [(1, 1), (3, 2), (6, 4)]
-SIZES_OF_MAPS = [(1, 1, 6), (3, 2, 6), (5, 6, 4)]
-"""Coordinates, elements, and number of machines.
-
-Among more machines with six elements there are some whose reference has 1e-10 only.
-"""
-
-PERIODS = 3
-WITH_LOADS = {
-    "transient_periods": 0,
-    "recorded_periods": PERIODS,
-    "section_points": PERIODS,
-    "tangent": True,
-    "contact": True,
-    "loads": True,
-}
-
-
-@cache
-def exact(coordinates, elements, count=6):
-    """Return machines with their start, their motion and growth, computed independently."""
-    machines = [random_machine(seed, coordinates, elements) for seed in range(count)]
-    starts, sections, growths, crossings = [], [], [], []
-    for seed, machine in enumerate(machines):
-        start = np.random.default_rng(seed).normal(size=2 * coordinates) * 0.5
-        tangent = np.full(2 * coordinates, 1.0 / np.sqrt(2 * coordinates))
-        found, crossed = machine.periods(np.concatenate([start, tangent]), PERIODS)
-        lengths = np.linalg.norm(found[:, 2 * coordinates :], axis=1)
-        starts.append(alternating(start, coordinates))
-        sections.append(alternating(found[:, : 2 * coordinates], coordinates))
-        growths.append(np.diff(np.log(lengths), prepend=0.0))
-        crossings.append(crossed)
-    return machines, np.array(starts), np.array(sections), np.array(growths), np.array(crossings)
 
 
 def mean_order(coarse, fine):

@@ -10,7 +10,7 @@ from gearchaos_kernels.contact.branches import (
 )
 from gearchaos_kernels.contact.elements import jumped
 from gearchaos_kernels.contact.kinds import kinds
-from gearchaos_kernels.contact.leaving import NEVER
+from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER
 from gearchaos_kernels.contact.searching import first_below
 from gearchaos_kernels.memory.block_memory import (
     load,
@@ -115,12 +115,22 @@ def leaving(memory, slot, number, branches, clearances, one_sided, at):
     series = memory, (at.gaps + number) * STRIDE + slot, at.elements * STRIDE, length
     if branch.engaged != 0.0:
         side = 1.0 if one_sided or branch.offset > 0.0 else -1.0
-        return first_below(gap_along, (series, side, -clearance), end.bend, 0.0, 1.0)
-    moment = first_below(gap_along, (series, -1.0, clearance), end.bend, 0.0, 1.0)
-    if not one_sided:
-        other = first_below(gap_along, (series, 1.0, clearance), end.bend, 0.0, 1.0)
-        moment = min(moment, other)
-    return moment
+        return fall_of((series, side, -clearance), end.bend)
+    moment = fall_of((series, -1.0, clearance), end.bend)
+    return moment if one_sided else min(moment, fall_of((series, 1.0, clearance), end.bend))
+
+
+@part
+def fall_of(given, bend):
+    """Return the share of a piece after which side * gap + distance falls below zero."""
+    moment = first_below(gap_along, given, bend, 0.0, 1.0)
+    if moment > 1.0:
+        return moment
+    # A piece is long, and the force of a damper may jump: the moment has to be exact to rounding.
+    value, slope = gap_along(given, moment)
+    correction = value / slope
+    exact = abs(correction) < LAST_CORRECTION and 0.0 <= moment - correction <= 1.0
+    return moment - correction if exact else moment
 
 
 @scalar

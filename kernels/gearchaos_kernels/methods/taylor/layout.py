@@ -10,10 +10,10 @@ from gearchaos_kernels.scene import Scene, provider_of
 TERMS = 24
 """Number of terms of a series after the constant one."""
 
-REACH = 2.0
+REACH = 2.5
 """Length of a piece, in times in which the fastest motion turns by 1 rad.
 
-The first term that is left out is then 2**25 / 25!, 2e-18 of the motion.
+The first term that is left out is then 2.5**25 / 25!, 6e-16 of the motion.
 """
 
 

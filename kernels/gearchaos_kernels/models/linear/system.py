@@ -198,19 +198,19 @@ class LinearSystems(LaneSystem):
         return rates
 
     def fastest_rates(self) -> Floats:
-        """Return the rate of the fastest motion: of the stiffest branch, and of the excitation.
+        """Return the rate of the fastest motion: of its branches, and of the excitation.
 
-        It is the largest natural frequency with all elements in contact at their stiffest, plus
-        the largest rate of damping, plus that of the highest harmonic.
+        It is the largest natural frequency, plus the largest rate of damping, plus that of the
+        highest harmonic. It is at least twice the latter, as harmonics of stiffness and of
+        excitation multiply. Branches are those with all elements in contact at their stiffest, and
+        with none: springs to the ground may be negative.
         """
-        engaged = self.reaction * self._stiffest()[:, np.newaxis]
-        springs = self.position + engaged @ self.gap
-        dampers = self.rate + (self.reaction * self.damping[:, np.newaxis]) @ self.gap
-        return (
-            np.sqrt(_largest_eigenvalues(springs))
-            + _largest_eigenvalues(dampers)
-            + self.harmonics() * self.frequency
-        )
+        springs = self.reaction * self._stiffest()[:, np.newaxis]
+        dampers = self.reaction * self.damping[:, np.newaxis]
+        frequency = _largest_eigenvalues(self.position, self.position + springs @ self.gap)
+        decay = _largest_eigenvalues(self.rate, self.rate + dampers @ self.gap)
+        harmonic = self.harmonics() * self.frequency
+        return np.maximum(np.sqrt(frequency) + decay, harmonic) + harmonic
 
     def _stiffest(self) -> Floats:
         """Return an upper bound of the stiffness of each element, shape (lanes, elements)."""
@@ -319,11 +319,15 @@ class LinearSystems(LaneSystem):
         return [one.name for one in fields(self) if isinstance(getattr(self, one.name), np.ndarray)]
 
 
-def _largest_eigenvalues(matrices: Floats) -> Floats:
-    """Return the largest size of an eigenvalue of each matrix, (lanes,); NaN if not finite."""
+def _largest_eigenvalues(*alternatives: Floats) -> Floats:
+    """Return the largest size of an eigenvalue of alternative matrices, (lanes,).
+
+    Each is of shape (lanes, n, n). NaN where they are not finite.
+    """
+    matrices = np.stack(alternatives, axis=1)
     found = np.full(len(matrices), np.nan)
-    finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.isfinite(matrices).all(axis=(1, 2, 3))
     different, lanes = np.unique(matrices[finite], axis=0, return_inverse=True)
-    sizes = np.abs(np.linalg.eigvals(different)).max(axis=1, initial=0.0)
+    sizes = np.abs(np.linalg.eigvals(different)).max(axis=(1, 2), initial=0.0)
     found[finite] = sizes[lanes.reshape(-1)]
     return found
