@@ -29,6 +29,10 @@ class Method:
         Whether maps are computed in advance; they take memory, and lanes share them.
     most_elements : int or None
         Largest number of clearance elements of a machine of any number of coordinates; None: any.
+    for_machines : bool
+        Whether it integrates machines only: matrices, trains and planetary sets, no gear pairs.
+    knows_gaps : bool
+        Whether the gap along a step is one polynomial, as continuations of grazing points need.
     """
 
     name: str
@@ -39,6 +43,8 @@ class Method:
     always_resolved: bool = False
     shares_maps: bool = False
     most_elements: int | None = None
+    for_machines: bool = False
+    knows_gaps: bool = True
 
     def description(self, steps: int, crossings: str) -> str:
         """Return the method with its settings in words, for the dry run and the metadata.
@@ -65,6 +71,18 @@ INTEGRATORS = (
         shares_maps=True,
         most_elements=52,
     ),
+    Method(
+        "taylor",
+        "Taylor series",
+        "series of the motion of a machine, exact between crossings and at them",
+        # They divide each step by themselves; the ends of steps are only where others may look.
+        steps=4,
+        exact=True,
+        always_resolved=True,
+        most_elements=52,
+        for_machines=True,
+        knows_gaps=False,
+    ),
 )
 """The methods that integrate lanes."""
 
@@ -82,6 +100,12 @@ DEFAULT = INTEGRATORS[0]
 
 EXACT = next(one for one in INTEGRATORS if one.exact)
 """The method to which others are compared."""
+
+EXACT_TITLES = " and ".join(one.title for one in INTEGRATORS if one.exact)
+"""The exact methods in words."""
+
+OWN_STEPS = ", ".join(f'{one.steps} with method = "{one.name}"' for one in INTEGRATORS if one.steps)
+"""Default steps per mesh period of the methods that have some of their own, in words."""
 
 EXACT_STEPS = EXACT.steps or 1
 """Default steps per mesh period of the exact method."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Generic, Literal, Self, TypeAlias, 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
-from gearchaos.configuration.methods import AUTO, DEFAULT, EXACT, METHODS
+from gearchaos.configuration.methods import AUTO, DEFAULT, EXACT_TITLES, METHODS, OWN_STEPS
 
 MOST_RUN_LANES = 100_000_000
 """Largest number of lanes of one run, limited by files and memory."""
@@ -167,8 +167,7 @@ class Integration(Table):
     method: MethodName = key("; ".join(one.words for one in METHODS.values()), default=DEFAULT.name)
     steps_per_period: int | None = key(
         f"steps per mesh period; by default {DEFAULT_STEPS}, doubled until the scene is resolved, "
-        f'and {EXACT.steps} with method = "{EXACT.name}"; with method = "{AUTO}" a given number is '
-        f"for {DEFAULT.title}",
+        f'{OWN_STEPS}; with method = "{AUTO}" a given number is for {DEFAULT.title}',
         example=400,
         default=None,
         ge=1,
@@ -177,7 +176,7 @@ class Integration(Table):
     tolerance: float | None = key(
         "largest error of section and exponent; steps_per_period are doubled until trial lanes of "
         "the sweep reach it, and transient_periods are raised where the section is still settling; "
-        f"{EXACT.title} are tried once",
+        f"{EXACT_TITLES} are tried once",
         example=1e-6,
         default=None,
         gt=0,
@@ -186,12 +185,12 @@ class Integration(Table):
     """share of the lanes that are computed again with half the step, to measure their error"""
     crossings: Literal["resolved", "plain"] = key(
         "whether a step that crosses a clearance boundary is split there, which keeps the order of "
-        f"the method, or is a plain step; {EXACT.title} resolve every crossing",
+        f"the method, or is a plain step; {EXACT_TITLES} resolve every crossing",
         default="resolved",
     )
     unstable: Literal["refuse", "raise"] = key(
         "whether a number of steps below the stability limit of a lane is refused, or raised to "
-        f"it; {EXACT.title} have no such limit",
+        f"it; {EXACT_TITLES} have no such limit",
         default="refuse",
     )
     transient_periods: int = key(default=500, ge=0, le=1_000_000_000)

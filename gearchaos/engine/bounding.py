@@ -19,6 +19,7 @@ from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
+from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -96,7 +97,9 @@ def find_boundaries(
             f"{name}: nothing lies between two values of {whole[0]}; sweep another parameter"
         )
     over = _Ranges.of(config)
-    search = _BoundarySearch(over, plan_run(_small(config, PARAMETERS)), longest, result)
+    search = _BoundarySearch(
+        over, plan_run(for_continuation(_small(config, PARAMETERS))), longest, result
+    )
     places = [
         (number, float(share))
         for number in search.axes_of_lines()

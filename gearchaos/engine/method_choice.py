@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import METHODS
 
-from gearchaos.configuration.methods import AUTO, DEFAULT, INTEGRATORS
+from gearchaos.configuration import methods
+from gearchaos.configuration.methods import AUTO, DEFAULT, EXACT, INTEGRATORS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
@@ -43,8 +44,7 @@ def alternatives(config: Configuration) -> Alternatives:
         except ConfigurationError as error:
             found.refused[method.name] = str(error).removeprefix(f"{config.source}: ")
             continue
-        system = Lanes(one).system_of(np.arange(1)) if method.shares_maps else None
-        if system is not None and (refusal := system.refuses_maps()):
+        if refusal := METHODS[method.name].refuses(Lanes(one).system_of(np.arange(1))):
             found.refused[method.name] = refusal
         else:
             found.possible[method.name] = one
@@ -108,6 +108,30 @@ def with_method(config: Configuration) -> tuple[Configuration, str]:
     reasons += [f"with {name}: {reason}" for name, reason in refused.items()]
     note = "; ".join([f'integration.method = "{AUTO}": {chosen} is taken', *reasons])
     return possible[chosen], note
+
+
+def for_continuation(config: Configuration) -> Configuration:
+    """Return a configuration whose method knows gaps along whole steps.
+
+    Parameters
+    ----------
+    config : Configuration
+        The configuration.
+
+    Returns
+    -------
+    Configuration
+        The same, or the configuration with flow maps if its method takes steps in pieces.
+
+    Raises
+    ------
+    ConfigurationError
+        If no method can integrate it.
+    """
+    chosen, _ = with_method(config)
+    if methods.METHODS[chosen.integration.method].knows_gaps:
+        return config
+    return chosen.integrated_by(EXACT.name)
 
 
 def _work(config: Configuration) -> float:

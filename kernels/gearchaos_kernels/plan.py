@@ -20,7 +20,8 @@ class Plan(NamedTuple):
     Attributes
     ----------
     steps_per_period : int
-        Steps per mesh period. Flow maps take a multiple of it where one step is too long for them.
+        Steps per mesh period. Flow maps take a multiple of it where one step is too long for them,
+        Taylor series where recorders read the ends of steps.
     transient_periods, recorded_periods : int
         Mesh periods of the transient and of the record that follows it.
     section_points : int
@@ -33,7 +34,7 @@ class Plan(NamedTuple):
     history_periods : int
         Number of mesh periods at the end in which every step is recorded.
     method : str
-        Name of the method: "rk4" or "flow_map".
+        Name of the method: "rk4", "flow_map" or "taylor".
     first_period : int
         Number of mesh periods before tau = 0, for an excitation that repeats after several.
     contact : bool
