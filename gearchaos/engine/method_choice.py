@@ -42,6 +42,9 @@ def alternatives(config: Configuration) -> Alternatives:
         try:
             one = config.integrated_by(method.name)
         except ConfigurationError as error:
+            if method.for_machines:
+                # Nothing to know for those who have no machine.
+                continue
             found.refused[method.name] = str(error).removeprefix(f"{config.source}: ")
             continue
         if refusal := METHODS[method.name].refuses(Lanes(one).system_of(np.arange(1))):

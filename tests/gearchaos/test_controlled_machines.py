@@ -17,7 +17,7 @@ from gearchaos.records.control import CAPTURED, NO_ORBIT
 from .commands import run_module
 
 MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
-STEPS = {"flow_map": 16, "rk4": 400}
+STEPS = {"flow_map": 16, "rk4": 400, "taylor": 4}
 METHODS = tuple(STEPS)
 DOUBLED = {"x1": 0.388, "x1_rate": 0.606, "x2": 0.4207, "x2_rate": 1.0617}
 """A state near the stable orbit of period 2 at the frequency 0.74, where the period is doubled."""

@@ -1,0 +1,107 @@
+"""Taylor series as the method of a machine, from its configuration to results."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.engine.method_choice import for_continuation, with_method
+from gearchaos.errors import ConfigurationError
+
+from .commands import run_module
+from .short_sweeps import PAN2021
+
+SWEEPS = Path(__file__).parents[2] / "sweeps"
+MASSES, PLANETARY = SWEEPS / "two_masses.toml", SWEEPS / "planetary.toml"
+SHORT = (
+    "integration.transient_periods=200",
+    "integration.recorded_periods=100",
+    "sweep.count=21",
+    "outputs.section_points=20",
+    "outputs.contact=true",
+    "outputs.exponents=true",
+    "start.carry='none'",
+)
+
+
+def config(method, *overrides):
+    return gearchaos.load_config(MASSES, [f"integration.method='{method}'", *SHORT, *overrides])
+
+
+@pytest.fixture(scope="module")
+def by_series(tmp_path_factory):
+    """The result of the two masses by Taylor series, from the command line."""
+    folder = tmp_path_factory.mktemp("series")
+    overrides = [f"--set={one}" for one in ("integration.method='taylor'", *SHORT)]
+    ended = run_module("gearchaos.sweep", str(MASSES), "-o", "out.h5", *overrides, cwd=folder)
+    assert ended.code == 0, ended.err
+    return gearchaos.open_result(folder / "out.h5")
+
+
+def test_a_sweep_by_series_is_that_of_flow_maps(by_series):
+    maps = gearchaos.run(config("flow_map"))
+    assert (maps["motion"] == by_series["motion"]).all()
+    periodic = maps["motion"] > 0
+    assert periodic.sum() >= 2
+    for name in ("section_x1", "lyapunov", "exponents"):
+        one, other = by_series[name][periodic], maps[name][periodic]
+        assert one == pytest.approx(other, abs=1e-9), name
+
+
+def test_metadata_name_the_method_in_words(by_series):
+    assert by_series.metadata["method"] == "taylor"
+    assert by_series.metadata["method_description"] == (
+        "Taylor series: series of the motion of a machine, exact between crossings and at them; "
+        "4 steps per period, resolved crossings"
+    )
+
+
+def test_continuations_of_a_machine_take_flow_maps():
+    assert for_continuation(config("taylor")).integration.method == "flow_map"
+    assert for_continuation(config("rk4")) == config("rk4")
+
+
+def test_auto_takes_series_where_rk4_has_fine_steps_and_every_speed_maps_of_its_own():
+    chosen, note = with_method(
+        gearchaos.load_config(
+            PLANETARY,
+            [
+                "integration={method='auto', steps_per_period=1600}",
+                "sweep.count=40",
+                "outputs.loads=false",
+            ],
+        )
+    )
+    assert chosen.integration.method == "taylor", note
+    assert "flow_map is estimated to take" in note
+
+
+def test_a_gear_pair_is_refused_with_a_remedy():
+    with pytest.raises(ConfigurationError) as refused:
+        gearchaos.load_config(PAN2021, ["integration.method='taylor'"])
+    assert (
+        'integration.method = "taylor": is for machines: model.kind = "linear" or "train"; '
+        'set it to "flow_map"'
+    ) in str(refused.value)
+
+
+def test_a_gear_pair_hears_nothing_of_methods_for_machines():
+    _, note = with_method(gearchaos.load_config(PAN2021, ["integration.method='auto'"]))
+    assert "taylor" not in note
+
+
+def test_plain_crossings_have_no_meaning():
+    with pytest.raises(ConfigurationError, match="which resolves every crossing"):
+        config("taylor", "integration.crossings='plain'")
+
+
+def test_an_orbit_and_its_multipliers_are_those_of_flow_maps():
+    one, other = (
+        gearchaos.System(config(method), frequency=0.72).orbit()
+        for method in ("taylor", "flow_map")
+    )
+    assert one.point == pytest.approx(other.point, abs=1e-10)
+    assert np.sort(np.abs(one.multipliers)) == pytest.approx(
+        np.sort(np.abs(other.multipliers)), abs=1e-9
+    )
