@@ -1,13 +1,16 @@
-"""How much faster are flow maps of a planetary set than a scalar Runge-Kutta loop at equal error?
+"""How fast are exact methods on a planetary set, and how much slower is a scalar Runge-Kutta loop?
 
-    python benchmarks/planetary.py [--lanes 10] [--periods 500] [--rounds 3]
+    python benchmarks/planetary.py [--lanes 40] [--periods 500] [--rounds 3] [--sweep 500]
 
 The set of sweeps/planetary.toml has up to 18 coordinates, less those that are held, and backlash in
-six meshes; every speed has maps of its own. Both contestants integrate the states alone, at speeds
+six meshes; every speed has maps of its own. All contestants integrate the states alone, at speeds
 spread over the sweep, on one thread, in processor time. The loop is that of a textbook: M^-1 times
 matrices, stage by stage, plain steps across clearance boundaries. The error is the largest one of a
 displacement after a few periods, in the median lane. Steps for smaller errors than measured follow
 from the order, which is printed. The time of flow maps includes making them.
+
+Last comes a whole sweep by Taylor series, with labels and exponents, in a process that has compiled
+everything before: 400 periods of transient and 100 recorded ones.
 """
 
 import argparse
@@ -22,7 +25,7 @@ from gearchaos_kernels import Plan, integrate
 from machine import print_machine
 from numba import njit
 
-from gearchaos import load_config
+from gearchaos import load_config, run
 from gearchaos.engine.lanes import Lanes
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "planetary.toml"
@@ -101,6 +104,15 @@ def by_maps(system, start: np.ndarray, steps: int, periods: int) -> np.ndarray:
     return integrate(system, start, Plan(steps, 0, periods, 0, method="flow_map")).end_state
 
 
+def by_series(system, start: np.ndarray, steps: int, periods: int) -> np.ndarray:
+    """Return the end states of all lanes by Taylor series."""
+    return integrate(system, start, Plan(steps, 0, periods, 0, method="taylor")).end_state
+
+
+EXACT = {"flow maps": (by_maps, 12), "Taylor series": (by_series, 4)}
+"""The exact methods, with their steps."""
+
+
 def error(found: np.ndarray, exact: np.ndarray) -> float:
     """Return the largest error of any displacement, relative to the largest one; in the median."""
     errors = np.abs(found - exact)[:, ::2].max(axis=1) / np.abs(exact[:, ::2]).max(axis=1)
@@ -117,9 +129,10 @@ def seconds(integrated, *given) -> float:
 def main() -> None:
     """Measure errors, then time both in turn, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--lanes", type=int, default=10)
+    parser.add_argument("--lanes", type=int, default=40)
     parser.add_argument("--periods", type=int, default=500)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--sweep", type=int, default=500, help="speeds of the sweep, 0 for none")
     options = parser.parse_args()
     print_machine()
     numba.set_num_threads(1)
@@ -127,28 +140,53 @@ def main() -> None:
     system = Lanes(config).system_of(np.arange(options.lanes))
     start = system.contact_state()
     exact = by_maps(system, start, 36, ERROR_PERIODS)
-    print(
-        f"flow maps, 12 steps: error {error(by_maps(system, start, 12, ERROR_PERIODS), exact):.1e}"
-    )
+    for name, (method, steps) in EXACT.items():
+        found = error(method(system, start, steps, ERROR_PERIODS), exact)
+        print(f"{name}, {steps} steps: error {found:.1e}")
     errors = [error(by_loop(system, start, steps, ERROR_PERIODS), exact) for steps in STEPS]
     order = np.log(errors[0] / errors[1]) / np.log(STEPS[1] / STEPS[0])
     for steps, found in zip(STEPS, errors, strict=True):
         print(f"scalar RK4, {steps} steps: error {found:.1e}")
     print(f"its order between them is {order:.2f}")
-    steps, times = [], []
-    for number in range(options.rounds):
-        # Another frequency needs other maps: none are kept from the round before.
-        other = replace(system, frequency=system.frequency * (1.0 + 1e-9 * (1 + number)))
-        loop = seconds(by_loop, other, start, STEPS[0], ERROR_PERIODS) / ERROR_PERIODS / STEPS[0]
-        maps = seconds(by_maps, other, start, 12, options.periods) / options.periods
-        steps.append(loop / maps)
-        times.append((loop / options.lanes, maps / options.lanes))
-    step, period = (1e6 * statistics.median(one) for one in zip(*times, strict=True))
-    print(f"scalar RK4: {step:.2f} us a step; flow maps: {period:.0f} us a lane and period")
-    print("error | steps of RK4 a period | times as long as flow maps")
+    times = [in_turn(system, start, number, options.periods) for number in range(options.rounds)]
+    loop, *others = (
+        1e6 * statistics.median(one) / options.lanes for one in zip(*times, strict=True)
+    )
+    print(f"scalar RK4: {loop:.2f} us a step")
+    for name, other in zip(EXACT, others, strict=True):
+        print(f"{name}: {other:.0f} us a lane and period")
+    print("error | steps of RK4 a period | " + " | ".join(f"in times of {name}" for name in EXACT))
     for wanted in WANTED:
         needed = STEPS[1] * (errors[1] / wanted) ** (1.0 / order)
-        print(f"{wanted:.0e} | {needed:.0f} | {needed * statistics.median(steps):.0f}")
+        shares = [
+            needed * statistics.median(one[0] / one[place] for one in times)
+            for place in range(1, 1 + len(EXACT))
+        ]
+        print(f"{wanted:.0e} | {needed:.0f} | " + " | ".join(f"{share:.0f}" for share in shares))
+    if options.sweep:
+        whole_sweep(options.sweep)
+
+
+def in_turn(system, start: np.ndarray, number: int, periods: int) -> list[float]:
+    """Return the seconds of one step of the loop, and of one period of each exact method."""
+    # Another frequency needs other maps: none are kept from the round before.
+    other = replace(system, frequency=system.frequency * (1.0 + 1e-9 * (1 + number)))
+    loop = seconds(by_loop, other, start, STEPS[0], ERROR_PERIODS) / ERROR_PERIODS / STEPS[0]
+    exact = [seconds(method, other, start, n, periods) / periods for method, n in EXACT.values()]
+    return [loop, *exact]
+
+
+def whole_sweep(speeds: int) -> None:
+    """Print the processor time of a sweep with labels and exponents, compilation apart."""
+    integration = "integration={method='taylor', transient_periods=400, recorded_periods=100}"
+    given = [integration, "outputs.loads=false", "outputs.contact=false"]
+    run(load_config(SWEEP, [*given, "sweep.count=8"]))
+    began = time.process_time()
+    result = run(load_config(SWEEP, [*given, f"sweep.count={speeds}"]))
+    took = time.process_time() - began
+    labels = dict(zip(*np.unique(result["motion"], return_counts=True), strict=True))
+    print(f"{speeds} speeds, 500 periods, labels and exponents: {took:.1f} s")
+    print("lanes by label:", {int(label): int(count) for label, count in labels.items()})
 
 
 if __name__ == "__main__":
