@@ -1,7 +1,7 @@
 """Where a polynomial first falls below zero: the moment at which a gap leaves its branch.
 
-The polynomial is searched piece by piece. Its cubic in a piece, and a bound on its fourth
-derivative, tell whether it can fall there.
+The polynomial is searched piece by piece. Whether it can fall in a piece follows from its cubic
+there and from a bound on its fourth derivative.
 """
 
 from gearchaos_kernels.compilation import part, scalar
