@@ -40,7 +40,7 @@ from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLos
 from gearchaos.engine.branching import arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
-from gearchaos.engine.method_choice import for_continuation, with_method
+from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.run_plan import plan_run
@@ -430,7 +430,7 @@ class System:
                 f"{self.config.source}: the orbit is none of this system; find it with "
                 "System.orbit of the same system"
             )
-        return arrays_of_branch(over, trace(curve, start), plan_run(for_continuation(self.config)))
+        return arrays_of_branch(over, trace(curve, start), plan_run(self.config))
 
     def orbits(self, period: int, record: int = CLOSE_RETURN_RECORD) -> list[Orbit]:
         """Find the periodic orbits that the motion comes near, also unstable ones within chaos.

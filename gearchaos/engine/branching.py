@@ -20,7 +20,6 @@ from gearchaos.dynamics.branches import (
 )
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
-from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -101,7 +100,7 @@ def find_branches(
         return system_of(config, {parameter: at}, config.needed_effects)
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
-    search = BranchSearch(over, plan_run(for_continuation(config)), longest)
+    search = BranchSearch(over, plan_run(config), longest)
     with one_thread():
         search.follow(search.motions(result, swept[0]))
         return _described(search, result.variables[swept[0]])
