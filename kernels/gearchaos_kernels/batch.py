@@ -229,7 +229,14 @@ def _actuation(system: LaneSystem, step: Floats, plan: Plan, inputs: Floats) -> 
     model = provider_of(system.flags())
     column = model.lane._fields.index(model.actuated)
     about = np.array([column, plan.first_period, control.begins, control.repeats])
-    given = {name: getattr(control, name) for name in Actuation._fields[:-3]}
+    given = {name: getattr(control, name) for name in Actuation._fields if name in control._fields}
+    # Intrinsics read rows of these arrays from one place on.
+    given["points"], given["response"] = map(
+        np.ascontiguousarray, (control.points, control.response)
+    )
+    for name in "transition", "correction":
+        columns = getattr(control, name).swapaxes(2, 3)
+        given[f"columns_of_{name}"] = np.ascontiguousarray(columns)
     strength = system.input_strength(step)
     return Actuation(**given, strength=strength, inputs=inputs, about=about)
 
