@@ -277,13 +277,16 @@ class Actuation(NamedTuple):
         `Control.transition` with its columns as rows.
     columns_of_correction : array, shape (lanes, points or 0, signals, states)
         `Control.correction` with its columns as rows.
+    steady : array, shape (lanes,)
+        The steady input of a lane, per step squared, without control.
     strength : array, shape (lanes,)
         Change of the steady input of a lane, per step squared, by an input of 1.
     inputs : array, shape (lanes, periods)
         The input of every mesh period, written by the blocks.
-    about : array of int, shape (4,)
+    about : array of int, shape (5,)
         Place of the steady input among the coefficients of a lane, mesh periods before the first
-        one, the mesh period in which the control begins, and `Control.repeats`.
+        one, the mesh period in which the control begins, `Control.repeats`, and 1 if there is
+        noise, otherwise 0.
     """
 
     points: Floats
@@ -296,6 +299,7 @@ class Actuation(NamedTuple):
     response: Floats
     columns_of_transition: Floats
     columns_of_correction: Floats
+    steady: Floats
     strength: Floats
     inputs: Floats
     about: NDArray[np.intp]
@@ -327,7 +331,7 @@ def act(memory, block, period, batch, control, given, scene):
                 varied = demanded(memory, slot, place, sources, 0.0, control, scene)
         predict(memory, slot, index, nearest, (effort, varied), control, scene)
         strength = control.strength[index]
-        coefficient = batch.coefficients[index, column] + strength * effort
+        coefficient = control.steady[index] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
         memory[control_rows(scene).varied * STRIDE + slot] = strength * varied
         begin_lane(memory, slot, read_lane(memory, slot, scene), given, scene)
@@ -382,9 +386,10 @@ def measure(memory, slot, index, moment, control, scales, scene):
         return nearest_point(memory, moment[1], control, index, scene)
     for state in range(at.states):
         value = state_at(memory, slot, index, state, scales)
-        noise = control.noise[index, state]
-        if noise > 0.0:
-            value += noise * gaussian(control.seeds[index], moment[0] * at.states + state)
+        if control.about[4] > 0:
+            noise = control.noise[index, state]
+            if noise > 0.0:
+                value += noise * gaussian(control.seeds[index], moment[0] * at.states + state)
         memory[known + state] = value
         if scene.tangent is not None:
             varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
@@ -406,9 +411,10 @@ def correct(memory, slot, place, moment, control, scales, scene):
     for signal in range(signals):
         state, column = control.measured[signal], first + signal * at.states
         value = state_at(memory, slot, index, state, scales)
-        noise = control.noise[index, signal]
-        if noise > 0.0:
-            value += noise * gaussian(control.seeds[index], moment[0] * signals + signal)
+        if control.about[4] > 0:
+            noise = control.noise[index, signal]
+            if noise > 0.0:
+                value += noise * gaussian(control.seeds[index], moment[0] * signals + signal)
         error = value - memory[kept + state]
         add_line(memory, at.known * STRIDE, error, columns, column, scene)
         if scene.tangent is not None:
