@@ -12,7 +12,7 @@ from gearchaos.records.period import TOLERANCE, coordinate_scale
 CLOSED = 1e-12
 """Return distance, relative to the scale of each state, below which an orbit is closed."""
 
-ROUNDING = 1e-13
+ROUNDING_OF_STATES = 1e-13
 """Return distance, relative to the largest state, below which an orbit is closed as well.
 
 Rounding errors of a large state reach all others. They may exceed `CLOSED` times a small scale.
@@ -95,8 +95,8 @@ def polish(
     Newton's method solves P(x) = x, P the map over the period; its Jacobian is integrated with the
     motion. A step is halved until the return distance falls. A state is measured by its largest
     magnitude on the section, or by a thousandth of the largest state if that is more. An orbit is
-    closed if the return distance is below `CLOSED` in this measure, or below `ROUNDING` times the
-    largest state.
+    closed if the return distance is below `CLOSED` in this measure, or below `ROUNDING_OF_STATES`
+    times the largest state.
     """
     remembers = system.control is not None and system.control.remembers
     chosen = np.flatnonzero((period > 0) & (not remembers))
@@ -161,7 +161,7 @@ class _Search:
         largest = np.max(np.abs(self._points), axis=1, keepdims=True)
         largest = np.maximum(largest, np.finfo(np.float64).tiny)
         distance = _distance(self._section[:, -1], self._points, largest)
-        closed: Mask = np.isfinite(self._residual) & (distance <= ROUNDING)
+        closed: Mask = np.isfinite(self._residual) & (distance <= ROUNDING_OF_STATES)
         return closed
 
     def _take_step(self, lanes: Integers) -> Mask:
