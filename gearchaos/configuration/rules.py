@@ -9,12 +9,12 @@ from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.configuration.run_tables import MOST_RUN_LANES, Control, Start
 from gearchaos.configuration.tables import (
-    LIMITS,
     OF_CONTROLLERS,
     Tables,
     of_the_machine,
     swept_values,
 )
+from gearchaos.records.control import LIMITS
 
 Rule: TypeAlias = Callable[[Any], Iterator[Fault]]
 
@@ -198,19 +198,10 @@ def _the_input_can_be_changed(config: Tables) -> Iterator[Fault]:
     control = config.control
     if control is None:
         return
-    known = " or ".join(f'"{name}"' for name in config.actuators)
-    actuator = config.actuator_of(control.actuator)
-    if not config.actuators:
-        rule = "the machine has no input that a controller could change"
-        yield Fault("control", rule, "give it a force or a torque, or leave out [control]")
-    elif not actuator:
-        rule = "is missing: the machine has several inputs"
-        yield Fault("control.actuator", rule, f"set actuator = {known}")
-    elif actuator not in config.actuators:
-        rule = f"a controller can change {known} only"
-        if actuator == "speed":
-            rule += "; another speed would change the length of the mesh period itself"
-        yield Fault("control.actuator", rule, f"set actuator = {known}", actuator)
+    fault = config.input_fault(control.actuator)
+    if fault:
+        where = "control.actuator" if config.actuators else "control"
+        yield Fault(where, *fault, config.actuator_of(control.actuator) or None)
     yield from _limit_faults(config, control)
 
 

@@ -111,6 +111,27 @@ class Tables(Titled):
         del actuator
         return False
 
+    def input_fault(self, given: str | None) -> tuple[str, str] | None:
+        """Return the rule that an input breaks and the remedy, None if a controller can change it.
+
+        ``given``: its name, None for the only one.
+        """
+        known, actuator = (
+            " or ".join(f'"{name}"' for name in self.actuators),
+            self.actuator_of(given),
+        )
+        if not self.actuators:
+            rule = "the machine has no input that a controller could change"
+            return rule, "give it a force or a torque"
+        if actuator in self.actuators:
+            return None
+        rule = f"a controller can change {known} only"
+        if not actuator:
+            rule = "is missing: the machine has several inputs"
+        elif actuator == "speed":
+            rule += "; another speed would change the length of the mesh period itself"
+        return rule, f"set actuator = {known}"
+
     def actuator_of(self, given: str | None) -> str:
         """Return the input that a controller changes, by default the only one; "" if none is."""
         alone = self.actuators[0] if len(self.actuators) == 1 else ""
@@ -189,10 +210,6 @@ OF_CONTROLLERS = MappingProxyType(
     }
 )
 """Keys of [control] that a sweep may vary, by path; the machine does not depend on them."""
-
-
-LIMITS = ("limit", "limit_Nm", "limit_force")
-"""Keys of [control] for the largest change of the input: a share, or a value in its unit."""
 
 
 def of_the_machine(config: Tables) -> dict[str, Sweep]:

@@ -12,6 +12,7 @@ from gearchaos_kernels import Control, Outcome, Plan
 
 from gearchaos.arguments import finite_number, instance, one_of, whole_number
 from gearchaos.arrays import Complex, Floats
+from gearchaos.configuration.messages import Fault
 from gearchaos.dynamics.control import controllability, require_controllable, sorted_multipliers
 from gearchaos.dynamics.controllers import ControlSettings, Designed, Target, control_of
 from gearchaos.dynamics.following import Orbit
@@ -267,15 +268,6 @@ def _checked(given: ControlSettings, system: System) -> ControlSettings:
 def _check_actuator(given: str | None, system: System) -> None:
     """Raise ConfigurationError unless a machine has the input, or only one if none is given."""
     config = system.config
-    known, actuator = config.actuators, config.actuator_of(given)
-    if not known:
-        raise ConfigurationError(
-            f"{config.source}: the machine has no input that a controller could change; give it a "
-            "force or a torque"
-        )
-    if not actuator:
-        raise ConfigurationError(
-            f"{config.source}: actuator: is missing: the machine has several inputs; choose one of "
-            f"{', '.join(known)}"
-        )
-    one_of("actuator", actuator, known)
+    fault = config.input_fault(given)
+    if fault:
+        raise ConfigurationError(Fault("actuator", *fault, given).text(config.source))

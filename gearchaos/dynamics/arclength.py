@@ -12,7 +12,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
-from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS
+from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS, ROUNDING_OF_STATES
 from gearchaos.dynamics.side_by_side import Found, Search, run
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
@@ -171,6 +171,11 @@ class Curve(NamedTuple):
         """
         return run(self.correcting(guess, direction), defects_of)
 
+    def _closed_to_rounding(self, place: Floats, defect: Floats) -> bool:
+        """Whether the defect (states,) of a place (states + 1,) is the rounding of its states."""
+        largest = float(np.max(np.abs(place[:-1] * self.scale)))
+        return float(np.max(np.abs(defect * self.scale))) <= ROUNDING_OF_STATES * largest
+
     def correcting(self, guess: Floats, direction: Floats) -> "Finding[CurvePoint | None]":
         """Return the search of `corrected`."""
         place, last = guess, np.inf
@@ -179,15 +184,17 @@ class Curve(NamedTuple):
             ((defect, slopes, passed),) = yield [Request(self, place, by_share)]
             size = float(np.max(np.abs(defect)))
             # Rounding of the state grows with the largest multiplier.
-            if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
+            closed = size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes))))
+            # The size is also NaN where the motion diverged.
+            stalled = not size < 0.5 * last
+            if closed or (stalled and self._closed_to_rounding(place, defect)):
                 if by_share is not None and np.linalg.norm(place - guess) > NEAR_ENOUGH:
                     (again,) = yield [Request(self, place)]
                     slopes = again.slopes
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, size, passed)
-            # The size is also NaN where the motion diverged.
-            if not size < 0.5 * last:
+            if stalled:
                 break
             try:
                 bordered = np.vstack([slopes, direction])

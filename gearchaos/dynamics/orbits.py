@@ -12,6 +12,12 @@ from gearchaos.records.period import TOLERANCE, coordinate_scale
 CLOSED = 1e-12
 """Return distance, relative to the scale of each state, below which an orbit is closed."""
 
+ROUNDING_OF_STATES = 1e-13
+"""Return distance, relative to the largest state, below which an orbit is closed as well.
+
+Rounding errors of a large state reach all others. They may exceed `CLOSED` times a small scale.
+"""
+
 NEIGHBOURHOOD = 0.1
 """Largest distance between an orbit and its guess, in the same measure."""
 
@@ -88,7 +94,9 @@ def polish(
     -----
     Newton's method solves P(x) = x, P the map over the period; its Jacobian is integrated with the
     motion. A step is halved until the return distance falls. A state is measured by its largest
-    magnitude on the section, or by a thousandth of the largest state if that is more.
+    magnitude on the section, or by a thousandth of the largest state if that is more. An orbit is
+    closed if the return distance is below `CLOSED` in this measure, or below `ROUNDING_OF_STATES`
+    times the largest state.
     """
     remembers = system.control is not None and system.control.remembers
     chosen = np.flatnonzero((period > 0) & (not remembers))
@@ -135,7 +143,7 @@ class _Search:
             if not lanes.size:
                 break
             searching[lanes] = self._take_step(lanes)
-        converged = self._residual <= CLOSED
+        converged = (self._residual <= CLOSED) | self._closed_to_rounding()
         converged &= ~_repeats_earlier(self._section, self._points, self._scale, self._maps.period)
         closed = np.flatnonzero(converged)
         self._complete(closed)
@@ -147,6 +155,14 @@ class _Search:
             order = np.argsort(-np.abs(found), axis=1, kind="stable")
             multipliers[closed] = np.take_along_axis(found, order, axis=1)
         return Orbits(self._points, multipliers, self._jacobian, self._residual, converged)
+
+    def _closed_to_rounding(self) -> Mask:
+        """Whether the last point returns as closely as rounding allows, (lanes,)."""
+        largest = np.max(np.abs(self._points), axis=1, keepdims=True)
+        largest = np.maximum(largest, np.finfo(np.float64).tiny)
+        distance = _distance(self._section[:, -1], self._points, largest)
+        closed: Mask = np.isfinite(self._residual) & (distance <= ROUNDING_OF_STATES)
+        return closed
 
     def _take_step(self, lanes: Integers) -> Mask:
         """Take the largest share of a Newton step that closes lanes better; return where any does.

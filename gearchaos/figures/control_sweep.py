@@ -13,10 +13,10 @@ from gearchaos.figures.lanes import Between, diagram_lanes, swept_axes
 from gearchaos.figures.page import Page, letter, page, remark
 from gearchaos.figures.style import BLUE, LEGEND, SINGLE_COLUMN_MM, VERMILION
 from gearchaos.outputs.names import axis_name
-from gearchaos.records.control import CAPTURED
+from gearchaos.records.control import CAPTURED, LIMITS
 from gearchaos.results.reading.result import Result, section_variables
 
-LIMITS = tuple(axis_name(f"control.{name}") for name in ("limit", "limit_Nm", "limit_force"))
+LIMIT_AXES = tuple(axis_name(f"control.{name}") for name in LIMITS)
 """Axes along which the value 0 is the machine without control."""
 
 SHARES = "cividis"
@@ -126,7 +126,7 @@ def _parts(result: Result) -> tuple[Result | None, Result]:
     if "capture" not in result.variables:
         raise FigureError("--control: is for results of sweeps with [control]; leave it out")
     free = None
-    for axis in LIMITS:
+    for axis in LIMIT_AXES:
         if axis in result.axes:
             values = result[axis]
             if values[0] == 0.0:
@@ -142,7 +142,7 @@ def _parts(result: Result) -> tuple[Result | None, Result]:
 
 def _words(held: Result) -> str:
     """Return what the diagram with control shows, in words."""
-    limit = held.fixed.get(LIMITS[0])
+    limit = held.fixed.get(LIMIT_AXES[0])
     within = "" if limit is None else f", at most {100.0 * limit:g} % of the input"
     return f"with control{within}"
 

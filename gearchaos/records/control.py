@@ -6,6 +6,9 @@ import numpy as np
 
 from gearchaos.arrays import Counts, Floats, Mask
 
+LIMITS = ("limit", "limit_Nm", "limit_force")
+"""Keys of [control] for the largest change of the input: a share, or a value in its unit."""
+
 CLOSEST_REACH = 1e-6
 """Largest distance of a captured motion without noise, as a share of the largest state."""
 

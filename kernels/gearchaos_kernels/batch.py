@@ -185,7 +185,7 @@ def _integrate_share(
         chosen,
         _turns(orders, share.steps),
     )
-    control = _actuation(system, step, plan, outcome.inputs)
+    control = _actuation(system, step, plan, batch.coefficients, outcome.inputs)
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
@@ -218,20 +218,33 @@ def _used(arrays: Any, scene: Scene) -> Any:
     return arrays._replace(**dict.fromkeys(unused.intersection(arrays._fields)))
 
 
-def _actuation(system: LaneSystem, step: Floats, plan: Plan, inputs: Floats) -> Actuation | Floats:
+def _actuation(
+    system: LaneSystem, step: Floats, plan: Plan, coefficients: Floats, inputs: Floats
+) -> Actuation | Floats:
     """Return controllers with how their input acts on lanes; an empty array if there are none.
 
-    ``step`` (lanes,): length of a step in units of tau; ``inputs``: see `Outcome`.
+    ``step`` (lanes,): length of a step in units of tau; ``coefficients``: see `Batch`; ``inputs``:
+    see `Outcome`.
     """
     control = system.control
     if control is None:
         return np.zeros(0)
     model = provider_of(system.flags())
     column = model.lane._fields.index(model.actuated)
-    about = np.array([column, plan.first_period, control.begins, control.repeats])
-    given = {name: getattr(control, name) for name in Actuation._fields[:-3]}
+    noisy = int(np.any(control.noise > 0.0))
+    about = np.array([column, plan.first_period, control.begins, control.repeats, noisy])
+    given = {name: getattr(control, name) for name in Actuation._fields if name in control._fields}
+    # Intrinsics read rows of these arrays from one place on.
+    given["points"], given["response"] = map(
+        np.ascontiguousarray, (control.points, control.response)
+    )
+    for name in "transition", "correction":
+        columns = getattr(control, name).swapaxes(2, 3)
+        given[f"columns_of_{name}"] = np.ascontiguousarray(columns)
+    # A column of its own: lanes are neighbours in it.
+    steady = np.ascontiguousarray(coefficients[:, column])
     strength = system.input_strength(step)
-    return Actuation(**given, strength=strength, inputs=inputs, about=about)
+    return Actuation(**given, steady=steady, strength=strength, inputs=inputs, about=about)
 
 
 def _turns(orders: Floats, steps: NDArray[np.intp]) -> Floats:

@@ -208,7 +208,9 @@ def copy_progress(source, target, block, scene):
     for row in range(source.shape[0] // STRIDE):
         if rows(scene).coefficients <= row < rows(scene).branches:
             continue
-        for slot in range(slots_of(block.lanes)):
+        # Estimates of a controller are side by side.
+        slots = STRIDE if row >= rows(scene).control else slots_of(block.lanes)
+        for slot in range(slots):
             target[row * STRIDE + slot] = source[row * STRIDE + slot]
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
+from gearchaos_kernels.memory.lines import add_line, copy_line, predict_line, vary_line
 from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
 from gearchaos_kernels.methods.protocol import begin_lane
 from gearchaos_kernels.plan import Floats
@@ -270,15 +271,22 @@ class Actuation(NamedTuple):
 
     Attributes
     ----------
-    points, gain, scales, limit, measured, noise, seeds, transition, response, correction : array
+    points, gain, scales, limit, measured, noise, seeds, response : array
         See `Control`.
+    columns_of_transition : array, shape (lanes, points or 0, states, states)
+        `Control.transition` with its columns as rows.
+    columns_of_correction : array, shape (lanes, points or 0, signals, states)
+        `Control.correction` with its columns as rows.
+    steady : array, shape (lanes,)
+        The steady input of a lane, per step squared, without control.
     strength : array, shape (lanes,)
         Change of the steady input of a lane, per step squared, by an input of 1.
     inputs : array, shape (lanes, periods)
         The input of every mesh period, written by the blocks.
-    about : array of int, shape (4,)
+    about : array of int, shape (5,)
         Place of the steady input among the coefficients of a lane, mesh periods before the first
-        one, the mesh period in which the control begins, and `Control.repeats`.
+        one, the mesh period in which the control begins, `Control.repeats`, and 1 if there is
+        noise, otherwise 0.
     """
 
     points: Floats
@@ -288,9 +296,10 @@ class Actuation(NamedTuple):
     measured: NDArray[np.intp]
     noise: Floats
     seeds: NDArray[np.uint64]
-    transition: Floats
     response: Floats
-    correction: Floats
+    columns_of_transition: Floats
+    columns_of_correction: Floats
+    steady: Floats
     strength: Floats
     inputs: Floats
     about: NDArray[np.intp]
@@ -302,18 +311,18 @@ def act(memory, block, period, batch, control, given, scene):
 
     ``control``: the `Actuation`.
     """
-    column, before, begins = control.about[0], control.about[1], control.about[2]
-    phase = before + period
+    column, repeats = control.about[0], control.about[3]
+    phase = control.about[1] + period
+    # Once for all lanes: a division takes as long as the feedback of a lane.
+    moment = phase, phase % repeats
     for slot in range(slots_of(block.lanes)):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
-        scale = batch.scales[index]
         if period == 0:
-            prepare(memory, slot, control.points[index], scale, scene)
-        measure(memory, slot, index, phase, control, scale, scene)
-        nearest = nearest_point(memory, slot, phase, control, index, scale, scene)
+            prepare(memory, slot, index, control, batch.scales, scene)
+        nearest = measure(memory, slot, index, moment, control, batch.scales, scene)
         place, at = (index, nearest), control_rows(scene)
         found = demanded(memory, slot, place, (at.known, at.kept), 1.0, control, scene)
-        used = phase >= begins and abs(found) <= control.limit[index]
+        used = phase >= control.about[2] and abs(found) <= control.limit[index]
         effort = found if used else 0.0
         varied = 0.0
         if scene.tangent is not None:
@@ -322,7 +331,7 @@ def act(memory, block, period, batch, control, given, scene):
                 varied = demanded(memory, slot, place, sources, 0.0, control, scene)
         predict(memory, slot, index, nearest, (effort, varied), control, scene)
         strength = control.strength[index]
-        coefficient = batch.coefficients[index, column] + strength * effort
+        coefficient = control.steady[index] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
         memory[control_rows(scene).varied * STRIDE + slot] = strength * varied
         begin_lane(memory, slot, index, read_lane(memory, slot, scene), given, scene)
@@ -331,91 +340,111 @@ def act(memory, block, period, batch, control, given, scene):
 
 
 @scalar
-def state_at(memory, slot, state, scale):
+def state_at(memory, slot, index, state, scales):
     """Return one state of a lane in the units of the equations."""
-    return memory[(STATE + state) * STRIDE + slot] * scale[state]
+    # A row of the scales would be an array of its own, whose references are counted.
+    return memory[(STATE + state) * STRIDE + slot] * scales[index, state]
 
 
 @scalar
-def prepare(memory, slot, points, scale, scene):
+def prepare(memory, slot, index, control, scales, scene):
     """Begin the estimate at the first point of the orbit, and the delay at the first state."""
-    first, states = control_rows(scene).kept, control_rows(scene).states
-    for state in range(states):
+    at = control_rows(scene)
+    for state in range(at.states):
         if scene.feedback.estimated is not None:
-            memory[(first + state) * STRIDE + slot] = points[0, state]
-            memory[(control_rows(scene).kept_varied + state) * STRIDE + slot] = 0.0
-        for earlier in range(control_rows(scene).delay):
-            row = first + earlier * states + state
-            memory[row * STRIDE + slot] = state_at(memory, slot, state, scale)
-            varied = control_rows(scene).kept_varied + earlier * states + state
-            memory[varied * STRIDE + slot] = 0.0
+            memory[estimate_of(at.kept, slot, scene) + state] = control.points[index, 0, state]
+            memory[estimate_of(at.kept_varied, slot, scene) + state] = 0.0
+        for earlier in range(at.delay):
+            row = earlier * at.states + state
+            value = state_at(memory, slot, index, state, scales)
+            memory[(at.kept + row) * STRIDE + slot] = value
+            memory[(at.kept_varied + row) * STRIDE + slot] = 0.0
 
 
 @scalar
-def measure(memory, slot, index, phase, control, scale, scene):
-    """Store what the controller knows of the state, and the same of the tangent vector."""
-    known, kept = control_rows(scene).known, control_rows(scene).kept
-    known_varied, kept_varied = control_rows(scene).known_varied, control_rows(scene).kept_varied
-    tangent = rows(scene).tangent
-    states = control_rows(scene).states
-    for state in range(states):
-        if scene.feedback.estimated is None:
-            value = state_at(memory, slot, state, scale)
+def estimate_of(first, slot, scene):
+    """Return the place of an estimate, whose numbers are side by side, or of its variation."""
+    return first * STRIDE + slot * control_rows(scene).states
+
+
+@scalar
+def measure(memory, slot, index, moment, control, scales, scene):
+    """Store what the controller knows of the state, and the same of the tangent vector.
+
+    ``moment``: number of the mesh period, and the phase of the excitation in mesh periods. Returns
+    the number of the orbit's nearest point.
+    """
+    at, tangent = control_rows(scene), rows(scene).tangent
+    known, known_varied = at.known * STRIDE, at.known_varied * STRIDE
+    if scene.feedback.estimated is not None:
+        copy_line(memory, known, estimate_of(at.kept, slot, scene), scene)
+        if scene.tangent is not None:
+            copy_line(memory, known_varied, estimate_of(at.kept_varied, slot, scene), scene)
+        nearest = nearest_point(memory, moment[1], control, index, scene)
+        correct(memory, slot, (index, nearest), moment, control, scales, scene)
+        # The corrected estimate may be nearer to another point.
+        return nearest_point(memory, moment[1], control, index, scene)
+    for state in range(at.states):
+        value = state_at(memory, slot, index, state, scales)
+        if control.about[4] > 0:
             noise = control.noise[index, state]
             if noise > 0.0:
-                value += noise * gaussian(control.seeds[index], phase * states + state)
-            memory[(known + state) * STRIDE + slot] = value
-            if scene.tangent is not None:
-                varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-                memory[(known_varied + state) * STRIDE + slot] = varied
-        else:
-            memory[(known + state) * STRIDE + slot] = memory[(kept + state) * STRIDE + slot]
-            if scene.tangent is not None:
-                varied = memory[(kept_varied + state) * STRIDE + slot]
-                memory[(known_varied + state) * STRIDE + slot] = varied
-    if scene.feedback.estimated is not None:
-        correct(memory, slot, index, phase, control, scale, scene)
-
-
-@scalar
-def correct(memory, slot, index, phase, control, scale, scene):
-    """Correct the estimate of a lane, and its variation, by what is measured."""
-    at, tangent = control_rows(scene), rows(scene).tangent
-    place = nearest_point(memory, slot, phase, control, index, scale, scene)
-    signals = control.measured.shape[0]
-    for signal in range(signals):
-        state, varied = control.measured[signal], 0.0
-        value = state_at(memory, slot, state, scale)
-        noise = control.noise[index, signal]
-        if noise > 0.0:
-            value += noise * gaussian(control.seeds[index], phase * signals + signal)
-        error = value - memory[(at.kept + state) * STRIDE + slot]
+                value += noise * gaussian(control.seeds[index], moment[0] * at.states + state)
+        memory[known + state] = value
         if scene.tangent is not None:
-            varied = memory[(tangent + state) * STRIDE + slot] * scale[state]
-            varied -= memory[(at.kept_varied + state) * STRIDE + slot]
-        for row in range(at.states):
-            factor = control.correction[index, place, row, signal]
-            memory[(at.known + row) * STRIDE + slot] += factor * error
-            if scene.tangent is not None:
-                memory[(at.known_varied + row) * STRIDE + slot] += factor * varied
+            varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
+            memory[known_varied + state] = varied
+    return nearest_point(memory, moment[1], control, index, scene)
 
 
 @scalar
-def nearest_point(memory, slot, phase, control, index, scale, scene):
+def correct(memory, slot, place, moment, control, scales, scene):
+    """Correct the estimate of a lane, and its variation, by what is measured.
+
+    ``place``: the lane and the nearest point of the orbit.
+    """
+    at, tangent, index = control_rows(scene), rows(scene).tangent, place[0]
+    signals, columns = control.measured.shape[0], control.columns_of_correction
+    first = place_of(place, control) * signals * at.states
+    kept = estimate_of(at.kept, slot, scene)
+    kept_varied = estimate_of(at.kept_varied, slot, scene)
+    for signal in range(signals):
+        state, column = control.measured[signal], first + signal * at.states
+        value = state_at(memory, slot, index, state, scales)
+        if control.about[4] > 0:
+            noise = control.noise[index, signal]
+            if noise > 0.0:
+                value += noise * gaussian(control.seeds[index], moment[0] * signals + signal)
+        error = value - memory[kept + state]
+        add_line(memory, at.known * STRIDE, error, columns, column, scene)
+        if scene.tangent is not None:
+            varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
+            varied -= memory[kept_varied + state]
+            add_line(memory, at.known_varied * STRIDE, varied, columns, column, scene)
+
+
+@scalar
+def place_of(place, control):
+    """Return the number of a point among the points of all lanes."""
+    return place[0] * control.points.shape[1] + place[1]
+
+
+@scalar
+def nearest_point(memory, first, control, index, scene):
     """Return the number of the orbit's point that is nearest to what is known of the state.
 
-    Only points at the same phase of the excitation are compared.
+    Only points at the same phase of the excitation are compared; ``first``: the first of them.
     """
     points, repeats = control.points.shape[1], control.about[3]
-    known = control_rows(scene).known
-    nearest = phase % repeats
+    known = control_rows(scene).known * STRIDE
+    nearest = first
     if points == repeats:
         return nearest
     least = math.inf
-    for point in range(phase % repeats, points, repeats):
+    for point in range(first, points, repeats):
         distance = 0.0
         for state in range(control_rows(scene).states):
-            value = memory[(known + state) * STRIDE + slot] - control.points[index, point, state]
+            value = memory[known + state] - control.points[index, point, state]
             distance += (value / control.scales[index, state]) ** 2
         if distance < least:
             nearest, least = point, distance
@@ -436,7 +465,7 @@ def demanded(memory, slot, place, sources, target, control, scene):
         reference = target * control.points[index, nearest, state]
         if delay > 0:
             reference = memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
-        deviation = memory[(known + state) * STRIDE + slot] - reference
+        deviation = memory[known * STRIDE + state] - reference
         total -= control.gain[index, nearest, state] * deviation
     return total
 
@@ -447,31 +476,38 @@ def predict(memory, slot, index, nearest, chosen, control, scene):
 
     ``chosen``: the input and its variation along the tangent vector.
     """
-    at, (effort, varied) = control_rows(scene), chosen
-    states = at.states
+    at = control_rows(scene)
     for earlier in range(at.delay - 1, -1, -1):
-        for state in range(states):
-            row = earlier * states + state
-            source = at.known + state if earlier == 0 else at.kept + row - states
-            memory[(at.kept + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+        for state in range(at.states):
+            move_back(memory, slot, (earlier, state), (at.known, at.kept), scene)
             if scene.tangent is not None:
-                source = at.known_varied + state if earlier == 0 else at.kept_varied + row - states
-                memory[(at.kept_varied + row) * STRIDE + slot] = memory[source * STRIDE + slot]
+                varied = at.known_varied, at.kept_varied
+                move_back(memory, slot, (earlier, state), varied, scene)
     if scene.feedback.estimated is not None:
-        following = (nearest + 1) % control.points.shape[1]
-        for row in range(states):
-            value = control.points[index, following, row]
-            value += control.response[index, nearest, row] * effort
-            change = control.response[index, nearest, row] * varied
-            for state in range(states):
-                factor = control.transition[index, nearest, row, state]
-                deviation = memory[(at.known + state) * STRIDE + slot]
-                value += factor * (deviation - control.points[index, nearest, state])
-                if scene.tangent is not None:
-                    change += factor * memory[(at.known_varied + state) * STRIDE + slot]
-            memory[(at.kept + row) * STRIDE + slot] = value
-            if scene.tangent is not None:
-                memory[(at.kept_varied + row) * STRIDE + slot] = change
+        following = nearest + 1 if nearest + 1 < control.points.shape[1] else 0
+        place = place_of((index, nearest), control) * at.states
+        then = place_of((index, following), control) * at.states
+        maps = control.response, control.columns_of_transition
+        target, source = estimate_of(at.kept, slot, scene), at.known * STRIDE
+        points = control.points, place, then
+        predict_line(memory, target, source, points, maps, chosen[0], scene)
+        if scene.tangent is not None:
+            target, source = estimate_of(at.kept_varied, slot, scene), at.known_varied * STRIDE
+            vary_line(memory, target, source, place, maps, chosen[1], scene)
+
+
+@scalar
+def move_back(memory, slot, number, sources, scene):
+    """Store one state one period further back, where the delay keeps it.
+
+    ``number``: periods back, and the state; ``sources``: rows of what is known and kept.
+    """
+    (earlier, state), (known, kept) = number, sources
+    row = kept + earlier * control_rows(scene).states + state
+    if earlier == 0:
+        memory[row * STRIDE + slot] = memory[known * STRIDE + state]
+    else:
+        memory[row * STRIDE + slot] = memory[(row - control_rows(scene).states) * STRIDE + slot]
 
 
 @scalar
@@ -479,8 +515,11 @@ def scale_variations(memory, slot, length, scene):
     """Divide all variations of the controller by the length of the tangent vector."""
     at = control_rows(scene)
     memory[at.varied * STRIDE + slot] /= length
-    for row in range(at.kept_varied, at.end):
-        memory[row * STRIDE + slot] /= length
+    for number in range(at.end - at.kept_varied):
+        if scene.feedback.estimated is not None:
+            memory[estimate_of(at.kept_varied, slot, scene) + number] /= length
+        else:
+            memory[(at.kept_varied + number) * STRIDE + slot] /= length
 
 
 @scalar

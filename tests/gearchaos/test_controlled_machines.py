@@ -1,4 +1,4 @@
-"""Control of machines: two masses and a stop by a force, a train by a torque, with both methods."""
+"""Control of machines: two masses and a stop by a force, trains by a torque, with both methods."""
 
 import json
 from functools import cache
@@ -17,6 +17,7 @@ from gearchaos.records.control import CAPTURED, NO_ORBIT
 from .commands import run_module
 
 MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
+PLANETARY = MASSES.with_name("planetary.toml")
 STEPS = {"flow_map": 16, "rk4": 400, "taylor": 4}
 METHODS = tuple(STEPS)
 DOUBLED = {"x1": 0.388, "x1_rate": 0.606, "x2": 0.4207, "x2_rate": 1.0617}
@@ -232,6 +233,67 @@ def test_the_torque_of_a_shaft_is_changed_in_newton_metres():
     other = gearchaos.System(other, {"operation.speed_rpm": 3000.0}).equations
     changed = system.actuated("output").with_steady_input(np.full(1, -59.0))
     np.testing.assert_allclose(changed.force, other.force, rtol=1e-14)
+
+
+def train(speed):
+    """Return the stage at a speed, its orbit, and a controller of it."""
+    config = gearchaos.Configuration.from_toml(TRAIN).without_control()
+    system = gearchaos.System(config, {"operation.speed_rpm": speed})
+    return Controller(system, system.orbit(), ControlSettings(limit_absolute=6.0))
+
+
+@cache
+def planetary():
+    """Return a controller of the planetary set by the torque on its carrier."""
+    config = gearchaos.load_config(PLANETARY).replace("integration.method", "flow_map")
+    system = gearchaos.System(config, {"operation.speed_rpm": 2000.0})
+    return Controller(system, system.orbit(), ControlSettings(limit=0.1))
+
+
+@pytest.mark.slow
+def test_an_orbit_of_many_states_closes_to_rounding():
+    """Displacements of 50 leave errors of 1e-12 in the smallest rates."""
+    orbit = planetary().orbit
+    assert orbit.point.size == 34
+    assert orbit.stable
+    assert np.abs(orbit.point).max() > 50.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", [planetary, lambda: train(3000.0)])
+def test_the_frame_of_a_controlled_train_has_the_designed_multipliers(controller):
+    found = controller()
+    frame = closed_frame(found)
+    np.testing.assert_allclose(frame, found.maps.closed(found.gain), atol=1e-8)
+    moved = np.sort(np.abs(np.linalg.eigvals(frame)))
+    np.testing.assert_allclose(moved, np.sort(np.abs(found.closed_multipliers)), atol=1e-8)
+    # The orbit is stable without control; with it, the motion returns faster.
+    assert np.abs(found.closed_multipliers[0]) < np.abs(found.multipliers[0]) < 1.0
+
+
+@pytest.mark.slow
+def test_a_sweep_of_a_planetary_set_is_controlled():
+    config = gearchaos.load_config(PLANETARY).replace(
+        {
+            "sweep": {"parameter": "operation.speed_rpm", "values": [2000.0, 2050.0]},
+            "integration": {"method": "flow_map", "transient_periods": 300, "recorded_periods": 20},
+            "control": {"limit": 0.1},
+            "outputs": {"section": ["carrier_u"], "section_points": 10, "lyapunov": False},
+        }
+    )
+    result = gearchaos.run(config)
+    assert (result["capture"] == CAPTURED).all()
+    assert (result["effort_largest"] > 0.0).all()
+    assert (result["effort_largest"] <= 0.1).all()
+    np.testing.assert_allclose(
+        result["effort_largest_Nm"], result["effort_largest"] * np.abs(load_of(config)), rtol=1e-9
+    )
+
+
+def load_of(config):
+    """Return the torque on the carrier at the first speed, in N m."""
+    system = gearchaos.System(config.without_control(), {"operation.speed_rpm": 2000.0})
+    return system.actuated("carrier").steady_input[0]
 
 
 REFUSED = [

@@ -114,9 +114,11 @@ class ControlRows(NamedTuple):
     varied : int
         Variation of the input along the tangent vector, scaled as the steady input of a lane.
     known, known_varied : int
-        What the controller knows of the state, and the same of the tangent vector.
+        What the controller knows of the state of the lane in turn, side by side, and the same of
+        the tangent vector.
     kept, kept_varied : int
-        What it keeps until the next mesh period, and the variation of that.
+        What it keeps until the next mesh period, and the variation of that. The estimate of slot s
+        is side by side as well, from number s * states on.
     end : int
         The row after the last one.
     delay : int
@@ -139,11 +141,12 @@ def control_rows_of(scene: Scene) -> ControlRows:
     """Return the rows that a controller uses in a block."""
     first, states, kept = rows_of(scene).control, scene.feedback.states, scene.feedback.kept
     known = first + 1
-    last = known + 2 * states
+    line = -(-states // STRIDE)
+    last = known + 2 * line
     return ControlRows(
         varied=first,
         known=known,
-        known_varied=known + states,
+        known_varied=known + line,
         kept=last,
         kept_varied=last + kept,
         end=last + 2 * kept,
@@ -156,7 +159,7 @@ def _control_size(scene: Scene) -> int:
     """Return the number of rows that a controller uses in a block."""
     if scene.control is None:
         return 0
-    size: int = 1 + 2 * scene.feedback.states + 2 * scene.feedback.kept
+    size: int = 1 + 2 * -(-scene.feedback.states // STRIDE) + 2 * scene.feedback.kept
     return size
 
 

@@ -1,0 +1,145 @@
+"""Numbers of one lane side by side, as explicit vectors along its states.
+
+An estimate is predicted by matrices that every lane has of its own. A vector of lanes would have to
+collect their numbers one by one, but those of one lane are neighbours.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from gearchaos_kernels.compilation import FASTMATH, first_element
+
+_DOUBLE = ir.DoubleType()
+_FLAGS = tuple(sorted(FASTMATH))
+
+
+class _Line:
+    """Generates loads, stores and sums of vectors as long as the state of a scene."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
+        self.context, self.builder = context, builder
+        self.arguments = tuple(zip(signature.args, arguments, strict=True))
+        self.states = signature.args[-1].scene.feedback.states
+        self.kind = ir.VectorType(_DOUBLE, self.states)
+
+    def address(self, array: int, at: int, further: int = 0) -> Any:
+        """Return the address of a number of an array; both are arguments, given by position."""
+        kind, value = self.arguments[array]
+        place = self.arguments[at][1]
+        place = self.builder.add(place, ir.Constant(place.type, further))
+        first = first_element(self.context, self.builder, kind, value)
+        return self.builder.gep(first, [place])
+
+    def parts(self, number: int) -> list[int]:
+        """Return the positions of the parts of an argument that is a tuple."""
+        kind, value = self.arguments[number]
+        parts = [
+            (one, self.builder.extract_value(value, part)) for part, one in enumerate(kind.types)
+        ]
+        first = len(self.arguments)
+        self.arguments += tuple(parts)
+        return list(range(first, first + len(parts)))
+
+    def load(self, array: int, at: int, further: int = 0) -> Any:
+        """Load a vector."""
+        place = self.address(array, at, further)
+        return self.builder.load(self.builder.bitcast(place, self.kind.as_pointer()), align=8)
+
+    def store(self, vector: Any, array: int, at: int) -> None:
+        """Store a vector."""
+        place = self.builder.bitcast(self.address(array, at), self.kind.as_pointer())
+        self.builder.store(vector, place, align=8)
+
+    def spread(self, number: Any) -> Any:
+        """Return a vector whose components all equal a number."""
+        index = ir.IntType(32)
+        nothing = ir.Constant(self.kind, ir.Undefined)
+        first = self.builder.insert_element(nothing, number, index(0))
+        order = ir.Constant(ir.VectorType(index, self.states), [index(0)] * self.states)
+        return self.builder.shuffle_vector(first, nothing, order)
+
+    def argument(self, number: int) -> Any:
+        """Return a vector whose components all equal an argument."""
+        return self.spread(self.arguments[number][1])
+
+    def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
+        """Return a b + c."""
+        return self.builder.fadd(c, self.builder.fmul(a, b, flags=_FLAGS), flags=_FLAGS)
+
+    def times(self, array: int, at: int, factors: Any, total: Any) -> Any:
+        """Add the columns of a matrix times the components of a vector, in their order."""
+        first = self.builder.mul(self.arguments[at][1], self.arguments[at][1].type(self.states))
+        self.arguments += ((types.intp, first),)
+        begin = len(self.arguments) - 1
+        for number in range(self.states):
+            factor = self.spread(self.builder.extract_element(factors, ir.IntType(32)(number)))
+            column = self.load(array, begin, number * self.states)
+            total = self.multiply_add(column, factor, total)
+        return total
+
+
+@intrinsic
+def copy_line(_typing, memory, target, source, scene):
+    """Copy the numbers of one state."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        line.store(line.load(0, 2), 0, 1)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, types.intp, scene), generate
+
+
+@intrinsic
+def add_line(_typing, memory, target, factor, array, at, scene):
+    """Add the numbers of an array, from a place on, times a factor."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        total = line.multiply_add(line.load(3, 4), line.argument(2), line.load(0, 1))
+        line.store(total, 0, 1)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, types.float64, array, types.intp, scene), generate
+
+
+@intrinsic
+def predict_line(_typing, memory, target, source, points, maps, effort, scene):
+    """Store r' + b u + A (z - r), which follows the estimate z at ``source``.
+
+    ``points``: the points of the orbit, and the places of r and r' among them; ``maps``: vectors b,
+    and matrices A whose columns follow each other, both in the order of the points.
+    """
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        orbit, place, then = line.parts(3)
+        responses, columns = line.parts(4)
+        point = line.load(orbit, place)
+        total = line.multiply_add(
+            line.load(responses, place), line.argument(5), line.load(orbit, then)
+        )
+        deviation = builder.fsub(line.load(0, 2), point, flags=_FLAGS)
+        line.store(line.times(columns, place, deviation, total), 0, 1)
+        return context.get_dummy_value()
+
+    place = types.intp
+    return types.void(memory, place, place, points, maps, types.float64, scene), generate
+
+
+@intrinsic
+def vary_line(_typing, memory, target, source, place, maps, varied, scene):
+    """Store the variation of what `predict_line` stores: b times that of u, and A that of z."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        responses, columns = line.parts(4)
+        total = builder.fmul(line.load(responses, 3), line.argument(5), flags=_FLAGS)
+        line.store(line.times(columns, 3, line.load(0, 2), total), 0, 1)
+        return context.get_dummy_value()
+
+    given = memory, types.intp, types.intp, types.intp, maps, types.float64, scene
+    return types.void(*given), generate
