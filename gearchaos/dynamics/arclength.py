@@ -41,7 +41,7 @@ ROUNDING = 1e-15
 """Return distance that rounding leaves, relative to the largest entry of the Jacobian."""
 
 NEAR_ENOUGH = 1e-5
-"""Distance from a guess up to which its derivative by the parameter is used for the tangent."""
+"""Longest step of Newton's method after which the derivative by the parameter is used again."""
 
 HALF_RETURN = 1e-2
 """Half-period return distance below which a curve ends in an orbit of half the period.
@@ -188,9 +188,6 @@ class Curve(NamedTuple):
             # The size is also NaN where the motion diverged.
             stalled = not size < 0.5 * last
             if closed or (stalled and self._closed_to_rounding(place, defect)):
-                if by_share is not None and np.linalg.norm(place - guess) > NEAR_ENOUGH:
-                    (again,) = yield [Request(self, place)]
-                    slopes = again.slopes
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, size, passed)
@@ -198,12 +195,13 @@ class Curve(NamedTuple):
                 break
             try:
                 bordered = np.vstack([slopes, direction])
-                place = place - np.linalg.solve(bordered, np.append(defect, 0.0))
+                step = np.linalg.solve(bordered, np.append(defect, 0.0))
             except np.linalg.LinAlgError:
                 break
-            # Later steps are so short that the derivative by the parameter changes little. To
-            # compute it costs as much as the orbit if the parameter changes the flow maps.
-            last, by_share = size, slopes[:, -1]
+            place, last = place - step, size
+            # After a short step the derivative by the parameter has changed little. To compute it
+            # costs as much as the orbit if the parameter changes the flow maps.
+            by_share = slopes[:, -1] if np.linalg.norm(step) <= NEAR_ENOUGH else None
         return None
 
     def doubled(self) -> Self:

@@ -63,6 +63,9 @@ ASIDE = 0.1
 CALM = 0.5
 """Largest change of the sum of multipliers in a step, relative to 1 and the sum."""
 
+CAUTION = 0.8
+"""Share of the allowed bend and of the allowed change of multipliers that a step aims at."""
+
 NEIGHBOURING = 0.2
 """Distance from a branch below which an orbit is compared with the branch more closely."""
 
@@ -267,8 +270,9 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
     while len(points) < MOST_POINTS:
         here = points[-1]
         trial, leaves = yield from _next(curve, here, step, bend)
+        longer = 0.5 if trial is None else _boldness(here, trial)
         if trial is None or not _succeeds(here, trial, step):
-            step /= 2.0
+            step *= min(max(longer, 0.25), 0.8)
             if step < SHORTEST_STEP:
                 return points, LOST
             continue
@@ -284,7 +288,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         bend = (trial.tangent - here.tangent) / length
         if len(points) > 3 and (yield from _meets(curve, here, trial, start)):
             return points, CLOSED_CURVE
-        step = min(2.0 * step, LONGEST)
+        step = min(max(min(longer, 2.0) * step, min(step, FIRST_STEP)), LONGEST)
     return points, TOO_MANY
 
 
@@ -316,9 +320,24 @@ def _next(
 
 def _succeeds(here: CurvePoint, trial: CurvePoint, step: float) -> bool:
     """Whether a point may be the next one: the curve is straight, the multipliers change little."""
-    before, after = (float(np.sum(one.multipliers).real) for one in (here, trial))
-    calm = abs(after - before) <= CALM * (1.0 + abs(before))
+    calm = _change(here, trial) <= CALM
     return bool(trial.tangent @ here.tangent >= SMOOTH and (calm or step <= FIRST_STEP))
+
+
+def _change(here: CurvePoint, trial: CurvePoint) -> float:
+    """Return the change of the sum of multipliers between two points, relative to 1 and the sum."""
+    before, after = (float(np.sum(one.multipliers).real) for one in (here, trial))
+    return abs(after - before) / (1.0 + abs(before))
+
+
+def _boldness(here: CurvePoint, trial: CurvePoint) -> float:
+    """Return how many times longer a step may be than the one from a point to another.
+
+    The angle between the tangents and the change of the multipliers grow with the step.
+    """
+    angle = np.arccos(np.clip(trial.tangent @ here.tangent, -1.0, 1.0))
+    used = max(angle / np.arccos(SMOOTH), _change(here, trial) / CALM)
+    return float(CAUTION / used) if used > 0.0 else np.inf
 
 
 def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:

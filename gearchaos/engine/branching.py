@@ -70,9 +70,8 @@ def find_branches(
     Returns
     -------
     BranchSet
-        The branches, those of the lowest values of the parameter first, each followed by those that
-        begin at its period doublings. Contact and loads of the orbits are computed if the sweep has
-        them.
+        The branches, those of the shortest period first, and of the lowest values of the parameter
+        among them. Contact and loads of the orbits are computed if the sweep has them.
 
     Raises
     ------
@@ -157,22 +156,30 @@ class BranchSearch:
         ]
 
     def follow(self, motions: Sequence[_Motion]) -> None:
-        """Follow the orbits of motions that lie on no known branch, one by one, with doublings."""
+        """Follow the orbits of motions that lie on no known branch, with doublings.
+
+        One motion of every period at a time: others of the period may lie on the same branch.
+        """
         known = 0
         while motions:
             # Only branches found since then may hold more of them.
             held = run(together([self._holds(one, NEAR, known) for one in motions]), defects_of)
             motions = [one for one, is_held in zip(motions, held, strict=True) if not is_held]
             known = len(self.found)
-            if motions:
-                self._follow(motions[0])
-                motions = motions[1:]
+            first = {motion.period: motion for motion in reversed(motions)}
+            self._follow([*first.values()])
+            motions = [motion for motion in motions if motion is not first[motion.period]]
 
-    def _follow(self, motion: _Motion) -> None:
-        """Follow the orbit of a motion; then all branches that begin or end on it side by side."""
+    def _follow(self, motions: Sequence[_Motion]) -> None:
+        """Follow the orbits of motions, then all branches that begin or end on them, side by side.
+
+        The branches with the shortest periods are added first.
+        """
         assert self._scale is not None, "motions() gives the scales"
-        curve = self.over.curve(self.run.plan, motion.period, self._scale)
-        waiting = [self._from_motion(curve, motion)]
+        waiting = [
+            self._from_motion(self.over.curve(self.run.plan, motion.period, self._scale), motion)
+            for motion in sorted(motions, key=lambda one: one.period)
+        ]
         while waiting:
             check()
             waiting = [
@@ -250,7 +257,10 @@ def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
     catalogue = run.lanes.model.catalogue
     sections = catalogue.variables((), {SECTION_PART: run.lanes.states})
     states = [one for one in sections if one.name.startswith(known.SECTION)]
-    branches = tuple(arrays_of_branch(search.over, one, run) for one in search.found)
+    branches = sorted(
+        (arrays_of_branch(search.over, one, run) for one in search.found),
+        key=lambda one: (one.period, float(one.value.min())),
+    )
     of_orbits = {name for one in branches for name in one.quantities}
     quantities = tuple(one for one in variables_of(run) if one.name in of_orbits)
     facts = {
@@ -265,7 +275,7 @@ def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
         "configuration_resolved": run.config.resolved_toml(),
     }
     del facts["wall_time_seconds"]
-    return BranchSet(parameter, tuple(states), branches, facts, quantities)
+    return BranchSet(parameter, tuple(states), tuple(branches), facts, quantities)
 
 
 def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> PeriodicBranch:

@@ -67,7 +67,7 @@ class GearPairModel(Model):
 
         def filled(name: str, absent: float = 0.0) -> Floats:
             value = getattr(found, name)
-            return np.broadcast_to(absent if value is None else value, lanes).astype(np.float64)
+            return np.full(lanes, absent if value is None else value, dtype=np.float64)
 
         multiple = filled("pitch_error")
         # "5.86 e(tau)" multiplies mean and amplitude of one pitch error alike (eq. 14).
