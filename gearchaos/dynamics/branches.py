@@ -12,7 +12,7 @@ branch, there is a special point between them, which is then located on the curv
 - grazing: an element begins or ceases to meet a flank.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -66,16 +66,16 @@ CALM = 0.5
 CAUTION = 0.8
 """Share of the allowed bend and of the allowed change of multipliers that a step aims at."""
 
-NEIGHBOURING = 0.2
-"""Distance from a branch below which an orbit is compared with the branch more closely."""
+BULGE = 0.1
+"""Largest distance of a branch from the chord between two of its points, relative to its length.
 
-MARGIN = 1e-4
-"""Share of the way by which an orbit may lie outside a stretch of a branch, next to a fold."""
+The branch bends by less than `SMOOTH` between them.
+"""
 
 UNDECIDED = 5e-3
-"""Distance up to which an orbit is taken as one of a branch if none is found at its share.
+"""Distance up to which an orbit is taken as one of a branch if the point abreast is not found.
 
-Next to a fold or a period doubling the equations are nearly singular.
+Next to a branch point the equations are nearly singular.
 """
 
 SAME_PLACE = 1e-7
@@ -149,33 +149,49 @@ class TracedBranch(NamedTuple):
         tolerance : float
             Largest distance, in the scales of the states.
         """
-        shares = self.places[:, -1]
-        one, other = shares[:-1], shares[1:]
-        low, high = np.minimum(one, other) - MARGIN, np.maximum(one, other) + MARGIN
-        (across,) = np.nonzero((low <= share) & (share <= high))
-        run = other[across] - one[across]
-        part = np.divide(share - one[across], run, out=np.zeros(across.size), where=run != 0.0)
-        part = np.clip(part, 0.0, 1.0)
-        between = self.places[across] + part[:, np.newaxis] * np.diff(self.places, axis=0)[across]
-        scaled = section / self.curve.scale
-        for guess in between:
-            distance = _distance(scaled, guess)
-            if tolerance < distance <= NEIGHBOURING:
-                # Between two of its points, the branch is not straight.
-                guess[-1] = share
-                found = yield from self.curve.correcting(guess, along_the_way(guess.size - 1))
-                if found is not None:
-                    distance = _distance(scaled, found.place)
-                elif distance <= UNDECIDED:
+        for point in section / self.curve.scale:
+            target = np.append(point, share)
+            for at, distance in self._near(target, tolerance):
+                if distance > tolerance:
+                    # Between two of its points, the branch is not straight.
+                    one, other = self.places[at : at + 2]
+                    found = yield from _abreast(self.curve, one, other, target)
+                    if found is not None:
+                        distance = float(np.max(np.abs(found.place - target)))
+                    elif distance <= UNDECIDED:
+                        return True
+                if distance <= tolerance:
                     return True
-            if distance <= tolerance:
-                return True
         return False
 
+    def _near(self, target: Floats, tolerance: float) -> list[tuple[int, float]]:
+        """Return the chords near which a place (states + 1,) may lie on the branch, nearest first.
 
-def _distance(section: Floats, place: Floats) -> float:
-    """Return the distance of a place (states + 1,) from the nearest point of a scaled section."""
-    return float(np.min(np.max(np.abs(section - place[:-1]), axis=1)))
+        A chord has the number of its first point, and its distance from the place.
+        """
+        chords = np.diff(self.places, axis=0)
+        squares = np.sum(chords**2, axis=1)
+        from_first = target - self.places[:-1]
+        along = np.sum(from_first * chords, axis=1)
+        # A special point may coincide with a point of the branch.
+        share = np.divide(along, squares, out=np.zeros_like(along), where=squares > 0.0)
+        aside = from_first - np.clip(share, 0.0, 1.0)[:, np.newaxis] * chords
+        distances = np.max(np.abs(aside), axis=1)
+        (near,) = np.nonzero((distances <= tolerance + BULGE * np.sqrt(squares)) & (squares > 0.0))
+        near = near[np.argsort(distances[near], kind="stable")]
+        return [*zip(near.tolist(), distances[near].tolist(), strict=True)]
+
+
+def _abreast(
+    curve: Curve, one: Floats, other: Floats, target: Floats
+) -> Finding[CurvePoint | None]:
+    """Search the point of a curve in the plane through a target, normal to a chord of the curve.
+
+    All are places (states + 1,); the chord leads from ``one`` to ``other``.
+    """
+    direction = (other - one) / np.linalg.norm(other - one)
+    guess = one + float((target - one) @ direction) * direction
+    return (yield from curve.correcting(guess, direction))
 
 
 def trace(
@@ -266,10 +282,10 @@ def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | No
 
 def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], str]]:
     """Follow a branch in the direction of a point's tangent; return its points and why it ends."""
-    points, step, bend = [start], FIRST_STEP, np.zeros_like(start.place)
+    points, step = [start], FIRST_STEP
     while len(points) < MOST_POINTS:
         here = points[-1]
-        trial, leaves = yield from _next(curve, here, step, bend)
+        trial, leaves = yield from _next(curve, points[-2:], step)
         longer = 0.5 if trial is None else _boldness(here, trial)
         if trial is None or not _succeeds(here, trial, step):
             step *= min(max(longer, 0.25), 0.8)
@@ -285,7 +301,6 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         points += [trial] if length > 0.0 else []
         if leaves:
             return points, EDGE
-        bend = (trial.tangent - here.tangent) / length
         if len(points) > 3 and (yield from _meets(curve, here, trial, start)):
             return points, CLOSED_CURVE
         step = min(max(min(longer, 2.0) * step, min(step, FIRST_STEP)), LONGEST)
@@ -293,13 +308,11 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
 
 
 def _next(
-    curve: Curve, here: CurvePoint, step: float, bend: Floats
+    curve: Curve, last: Sequence[CurvePoint], step: float
 ) -> Finding[tuple[CurvePoint | None, bool]]:
-    """Search the next point of a curve, or None, and whether it is the edge of the range.
-
-    ``bend`` (states + 1,): derivative of the tangent by the arclength.
-    """
-    guess = here.place + step * here.tangent + 0.5 * step**2 * bend
+    """Search the next point of a curve, or None, and whether the range ends there."""
+    here = last[-1]
+    guess = _ahead(last, step)
     if 0.0 <= guess[-1] <= 1.0:
         trial = yield from curve.correcting(guess, here.tangent)
         if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
@@ -316,6 +329,23 @@ def _next(
     # The tangent of a point at the edge has the direction of the parameter.
     onward = np.sign(trial.tangent @ here.tangent) or 1.0
     return trial._replace(tangent=onward * trial.tangent), True
+
+
+def _ahead(last: Sequence[CurvePoint], step: float) -> Floats:
+    """Return the place a step beyond the last points of a curve (states + 1,).
+
+    The cubic through two points and their tangents is extended; one point has its tangent only.
+    """
+    *before, here = last
+    ahead = here.place + step * here.tangent
+    if not before:
+        return ahead
+    chord = here.place - before[0].place
+    length = np.linalg.norm(chord)
+    slope, old = chord / length, before[0].tangent
+    square = (2.0 * here.tangent + old - 3.0 * slope) / length
+    cube = (here.tangent + old - 2.0 * slope) / length**2
+    return ahead + step**2 * square + step**3 * cube
 
 
 def _succeeds(here: CurvePoint, trial: CurvePoint, step: float) -> bool:
@@ -353,13 +383,13 @@ def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint)
     if trial.tangent[-1] * start.tangent[-1] <= 0.0:
         return False
     chord = trial.place - here.place
-    length = np.linalg.norm(chord)
+    length = float(np.linalg.norm(chord))
     for point in start.section / curve.scale:
         target = np.append(point, start.share)
         along = float((target - here.place) @ chord) / length
-        guess = here.place + along * chord / length
-        if 0.0 <= along <= length and np.linalg.norm(target - guess) <= NEIGHBOURING:
-            found = yield from curve.correcting(guess, chord / length)
+        aside = np.linalg.norm(target - here.place - along / length * chord)
+        if 0.0 <= along <= length and aside <= BULGE * length:
+            found = yield from _abreast(curve, here.place, trial.place, target)
             if found is not None and np.max(np.abs(found.place - target)) < SAME_PLACE:
                 return True
     return False

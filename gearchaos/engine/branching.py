@@ -166,19 +166,16 @@ class BranchSearch:
             held = run(together([self._holds(one, NEAR, known) for one in motions]), defects_of)
             motions = [one for one, is_held in zip(motions, held, strict=True) if not is_held]
             known = len(self.found)
-            first = {motion.period: motion for motion in reversed(motions)}
-            self._follow([*first.values()])
-            motions = [motion for motion in motions if motion is not first[motion.period]]
+            middle = _middle_of_each_period(motions)
+            self._follow(middle)
+            motions = [one for one in motions if not any(one is other for other in middle)]
 
     def _follow(self, motions: Sequence[_Motion]) -> None:
-        """Follow the orbits of motions, then all branches that begin or end on them, side by side.
-
-        The branches with the shortest periods are added first.
-        """
+        """Follow the orbits of motions, then what begins or ends on them, side by side."""
         assert self._scale is not None, "motions() gives the scales"
         waiting = [
             self._from_motion(self.over.curve(self.run.plan, motion.period, self._scale), motion)
-            for motion in sorted(motions, key=lambda one: one.period)
+            for motion in motions
         ]
         while waiting:
             check()
@@ -244,6 +241,17 @@ class BranchSearch:
             ):
                 return True
         return False
+
+
+def _middle_of_each_period(motions: Sequence[_Motion]) -> list[_Motion]:
+    """Return one motion of every period, of the shortest first.
+
+    From the middle of its range a branch is followed in both directions for about the same time.
+    """
+    by_period: dict[int, list[_Motion]] = {}
+    for motion in motions:
+        by_period.setdefault(motion.period, []).append(motion)
+    return [same[len(same) // 2] for _, same in sorted(by_period.items())]
 
 
 def _motion_at(curve: Curve, point: CurvePoint) -> _Motion:
