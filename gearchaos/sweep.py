@@ -132,8 +132,9 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
     check_output(output, options.overwrite)
     began = time.monotonic()
     with open_store(run, output, resume=options.resume, shard=shard) as store:
-        # Workers compile for themselves: they may run on another kind of machine.
-        run = prepare(run, compile_now=options.dask is None and store.own_lanes > 0)
+        if store.own_lanes:
+            # Workers compile for themselves: they may run on another kind of machine.
+            run = prepare(run, compile_now=options.dask is None)
         try:
             tally, performed_by = fill(run, store, options.dask)
             seconds = time.monotonic() - began
