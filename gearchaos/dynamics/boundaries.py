@@ -3,16 +3,26 @@
 The boundaries are folds, period doublings, Neimark-Sacker points and grazings of periodic orbits.
 """
 
+from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from gearchaos.arrays import Complex, Floats, Mask
+from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import CurvePoint
-from gearchaos.dynamics.boundary_equations import PARAMETERS, Equations, OnBoundary, Reference
+from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
+from gearchaos.dynamics.boundary_following import (
+    FIRST_STEP,
+    Path,
+    among_columns,
+    cubic,
+    fixed_direction,
+    following,
+)
+from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
+from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
-    CORNER,
     CUSP,
     FLIP_NEIMARK_SACKER,
     FOLD_FLIP,
@@ -20,51 +30,19 @@ from gearchaos.records.boundary import (
     GRAZING_FLIP,
     GRAZING_FOLD,
     GRAZING_NEIMARK_SACKER,
-    NO_EXTREME,
     NOT_STARTED,
     RESONANCES,
     STRONG_RESONANCE_11,
     STRONG_RESONANCE_12,
     WEAKER_RESONANCES,
 )
-from gearchaos.records.branch import (
-    CLOSED_CURVE,
-    EDGE,
-    FOLD,
-    GRAZING,
-    HALVING,
-    LOST,
-    NEIMARK_SACKER,
-    PERIOD_DOUBLING,
-    TOO_MANY,
-)
-
-FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-5
-"""Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
-
-SMOOTH, TURN = 0.9, 0.3
-"""Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
-
-ASIDE = 0.3
-"""Largest share of a step by which a point may lie aside of its prediction."""
-
-MOST_POINTS = 1000
-"""Largest number of points computed along one direction of a boundary."""
+from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBLING
 
 LOCATED, MOST_TRIALS = 1e-10, 60
 """Length of the stretch in which a point of codimension 2 is located, and the most trials."""
 
-SAME_CURVE = 2e-3
-"""Largest distance of the first point from a boundary that closes on itself."""
-
 NEAR, SAME_PLACE = 0.05, 1e-6
 """Distance from a boundary up to which a point is compared, and that of the same point."""
-
-GRAZES = 1e-3
-"""Distance of a gap from a flank, in half clearances, at which a boundary ends at a grazing."""
-
-HALF_RETURN = 1e-2
-"""Half-period return distance below which a boundary ends in orbits of half the period."""
 
 TESTS = {
     FOLD: (CUSP, STRONG_RESONANCE_11, FOLD_FLIP, FOLD_NEIMARK_SACKER),
@@ -77,8 +55,8 @@ TESTS = {
 FLAT = 1e-3
 """Largest distance of a boundary from the line between two points, in shares of both ranges."""
 
-STEEP = 0.2
-"""Least component of a tangent by a parameter that stays fixed while a point is corrected."""
+SETTLED = 1e-8
+"""Distance of two successive trials below which the next one would change less than `LOCATED`."""
 
 _WITH_PAIR = (FOLD_NEIMARK_SACKER, FLIP_NEIMARK_SACKER, GRAZING_NEIMARK_SACKER)
 
@@ -117,8 +95,8 @@ class TracedBoundary(NamedTuple):
     located: list[Located]
     ends: tuple[str, str]
 
-    def holds(self, start: OnBoundary) -> bool:
-        """Return whether a point of the same kind, period and flank lies on the boundary."""
+    def holding(self, start: OnBoundary) -> Following[bool]:
+        """Search whether a point of the same kind, period and flank lies on the boundary."""
         states = self.equations.scale.size
         for state in start.section / self.equations.scale:
             place = np.append(state, start.place[states:])
@@ -129,7 +107,7 @@ class TracedBoundary(NamedTuple):
             guess = guess - ((guess - place) @ direction) * direction
             if np.linalg.norm(guess - place) < SAME_PLACE:
                 return True
-            found = self.equations.corrected(guess, direction, reference)
+            found = yield from self.equations.correcting(guess, direction, reference)
             if found is not None and np.linalg.norm(found.place - place) < SAME_PLACE:
                 return True
         return False
@@ -153,7 +131,7 @@ class TracedBoundary(NamedTuple):
             if aside > NEAR + 0.3 * length:
                 continue
             parts = np.clip(share + np.linspace(-0.2, 0.2, 41), 0.0, 1.0)
-            curve = _cubic(one, other, parts)
+            curve = cubic(one, other, parts)
             distances = np.linalg.norm(curve - place, axis=1)
             at = int(np.argmin(distances))
             if distances[at] < best:
@@ -162,17 +140,6 @@ class TracedBoundary(NamedTuple):
         if found is None:
             return None
         return found[0], found[1] / np.linalg.norm(found[1]), found[2]
-
-
-def _cubic(one: OnBoundary, other: OnBoundary, share: Floats) -> Floats:
-    """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
-    length = np.linalg.norm(other.place - one.place)
-    t = share[:, np.newaxis]
-    return np.asarray(
-        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * one.place
-        + t**2 * (3.0 - 2.0 * t) * other.place
-        + length * t * (1.0 - t) * ((1.0 - t) * one.tangent - t * other.tangent)
-    )
 
 
 def unstarted(equations: Equations, place: Floats, special: CurvePoint) -> TracedBoundary:
@@ -195,33 +162,38 @@ def unstarted(equations: Equations, place: Floats, special: CurvePoint) -> Trace
     return TracedBoundary(equations, [one], place[np.newaxis], np.zeros(1), [], ends)
 
 
-def trace_boundary(equations: Equations, start: OnBoundary) -> TracedBoundary:
-    """Follow a boundary from one of its points in both directions, within both ranges.
+def tracing(equations: Equations, starts: Sequence[OnBoundary]) -> Following[list[TracedBoundary]]:
+    """Follow the boundaries of one kind through some of their points, within both ranges.
 
     Parameters
     ----------
     equations : Equations
-        Its equations.
-    start : OnBoundary
-        One of its points.
+        Their equations.
+    starts : sequence of OnBoundary
+        Points of them.
 
     Returns
     -------
-    TracedBoundary
-        The boundary with its points of codimension 2.
+    list of TracedBoundary
+        The boundaries with their points of codimension 2. Those of several starts are one.
     """
-    ahead, last = _half(equations, start)
-    behind, first = [start], last
-    if last != CLOSED_CURVE:
-        behind, first = _half(equations, _turned(start))
-    points = [_turned(one) for one in behind[:0:-1]] + ahead
+    paths = yield from following(equations, starts)
+    return (yield from together([_completed(equations, one) for one in paths]))
+
+
+def _completed(equations: Equations, path: Path) -> Following[TracedBoundary]:
+    """Add the points between the points of a path that are of codimension 2, or make it smooth."""
+    points = yield from _flattened(equations, path.points)
+    between = yield from together(
+        [_located_between(equations, one, other) for one, other in pairwise(points)]
+    )
     joined, located = points[:1], []
-    for one, other in pairwise(_flattened(equations, points)):
-        for kind, point in _located_between(equations, one, other):
+    for other, some in zip(points[1:], between, strict=True):
+        for kind, point in some:
             located.append(Located(kind, len(joined), point))
             joined.append(point)
         joined.append(other)
-    ends = [first, last]
+    ends = [*path.ends]
     joined, located = _cut(joined, located, ends)
     places = np.array([one.place for one in joined])
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -229,29 +201,36 @@ def trace_boundary(equations: Equations, start: OnBoundary) -> TracedBoundary:
     return TracedBoundary(equations, joined, places, positions, located, (ends[0], ends[1]))
 
 
-def _flattened(equations: Equations, points: list[OnBoundary]) -> list[OnBoundary]:
+def _flattened(equations: Equations, points: list[OnBoundary]) -> Following[list[OnBoundary]]:
     """Add points where lines between successive ones would lie beside the curve."""
-    waiting, found = points[:0:-1], points[:1]
-    while waiting:
-        one, other = found[-1], waiting[-1]
-        chord = other.place - one.place
-        length = float(np.linalg.norm(chord))
-        middle = _cubic(one, other, np.array([0.5]))[0]
-        aside = np.linalg.norm((middle - (one.place + other.place) / 2.0)[-PARAMETERS:])
-        if aside > FLAT and length > FIRST_STEP:
-            direction = _fixed(equations, chord / length)
-            between = equations.corrected(middle, direction, one.reference)
-            if between is not None and np.linalg.norm(between.place - middle) < length / 2.0:
-                onward = np.sign(between.tangent @ chord) or 1.0
-                waiting.append(between._replace(tangent=onward * between.tangent))
-                continue
-        found.append(waiting.pop())
-    return found
+    added = yield from together(
+        [_points_between(equations, one, other) for one, other in pairwise(points)]
+    )
+    return points[:1] + [
+        point for other, some in zip(points[1:], added, strict=True) for point in (*some, other)
+    ]
 
 
-def _turned(point: OnBoundary) -> OnBoundary:
-    """Return a point with the opposite tangent."""
-    return point._replace(tangent=-point.tangent)
+def _points_between(
+    equations: Equations, one: OnBoundary, other: OnBoundary
+) -> Following[list[OnBoundary]]:
+    """Search the points between two that a smooth curve needs."""
+    chord = other.place - one.place
+    length = float(np.linalg.norm(chord))
+    middle = cubic(one, other, np.array([0.5]))[0]
+    aside = np.linalg.norm((middle - (one.place + other.place) / 2.0)[-PARAMETERS:])
+    if not (aside > FLAT and length > FIRST_STEP):
+        return []
+    guess, direction = among_columns(equations, middle, chord / length, 0.2 * length)
+    between = yield from equations.correcting(guess, direction, one.reference)
+    if between is None or np.linalg.norm(between.place - middle) >= length / 2.0:
+        return []
+    onward = np.sign(between.tangent @ chord) or 1.0
+    between = between._replace(tangent=onward * between.tangent)
+    before, after = yield from together(
+        [_points_between(equations, *ends) for ends in ((one, between), (between, other))]
+    )
+    return [*before, between, *after]
 
 
 def _cut(
@@ -277,117 +256,6 @@ def _cut(
         one._replace(number=one.number - first) for one in located if first <= one.number <= last
     ]
     return points[first : last + 1], kept
-
-
-def _half(equations: Equations, start: OnBoundary) -> tuple[list[OnBoundary], str]:
-    """Follow a boundary in the direction of a tangent; return its points and why it ends."""
-    points, step, bend = [start], FIRST_STEP, np.zeros_like(start.place)
-    while len(points) < MOST_POINTS:
-        here = points[-1]
-        trial, leaves = _next(equations, here, step, bend)
-        if trial is None or trial.tangent @ here.tangent < SMOOTH:
-            step /= 2.0
-            if step < SHORTEST:
-                return points, _why_lost(equations, here)
-            continue
-        if here.halfway.size and here.halfway @ trial.halfway <= 0.0:
-            if np.max(np.abs(here.halfway)) < HALF_RETURN:
-                return points, HALVING
-            step /= 2.0
-            continue
-        length = float(np.linalg.norm(trial.place - here.place))
-        points += [trial] if length > 0.0 else []
-        if leaves:
-            return points, EDGE
-        if _ends_in_resonance(points):
-            # The curve continues as one of neutral saddles, which is no boundary.
-            onward = trial.reference.cosine > 0.0
-            return points, STRONG_RESONANCE_11 if onward else STRONG_RESONANCE_12
-        bend = (trial.tangent - here.tangent) / length
-        if len(points) > 3 and _meets(here, trial, start):
-            return [*points[:-1], start._replace(tangent=trial.tangent)], CLOSED_CURVE
-        turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
-        step = min(length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0), LONGEST)
-    return points, TOO_MANY
-
-
-def _why_lost(equations: Equations, here: OnBoundary) -> str:
-    """Return why no further point is found."""
-    if here.halfway.size and np.max(np.abs(here.halfway)) < HALF_RETURN:
-        return HALVING
-    if equations.kind == GRAZING:
-        return NO_EXTREME
-    # The test function has no derivative where a further flank grazes.
-    return CORNER if equations.nearest_flank(here.place) < GRAZES else LOST
-
-
-def _ends_in_resonance(points: list[OnBoundary]) -> bool:
-    """Whether the pair of a Neimark-Sacker curve has been real at the last two points."""
-    return len(points) > 2 and all(abs(one.reference.cosine) > 1.0 + 1e-9 for one in points[-2:])
-
-
-def _next(
-    equations: Equations, here: OnBoundary, step: float, bend: Floats
-) -> tuple[OnBoundary | None, bool]:
-    """Return the next point of a boundary, or None, and whether it lies at an edge."""
-    guess = here.place + step * here.tangent + 0.5 * step**2 * bend
-    outside = (guess < 0.0) | (guess > 1.0)
-    outside[:-PARAMETERS] = False
-    if not outside.any():
-        trial = equations.corrected(guess, _fixed(equations, here.tangent), here.reference)
-        if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
-            return None, False
-        if np.all((trial.shares >= 0.0) & (trial.shares <= 1.0)):
-            return trial, False
-        outside = (trial.place < 0.0) | (trial.place > 1.0)
-        outside[:-PARAMETERS] = False
-        guess = trial.place
-    return _at_edge(equations, here, guess, step, outside), True
-
-
-def _fixed(equations: Equations, tangent: Floats) -> Floats:
-    """Return the direction normal to which a point is corrected.
-
-    Where flow maps depend on one of the parameters, this parameter stays fixed if the curve is not
-    nearly normal to it: each further value would need maps of its own.
-    """
-    direction, number = tangent, equations.fixed
-    if number >= 0 and abs(tangent[number - PARAMETERS]) > STEEP:
-        direction = np.zeros_like(tangent)
-        direction[number - PARAMETERS] = np.sign(tangent[number - PARAMETERS])
-    return direction
-
-
-def _at_edge(
-    equations: Equations, here: OnBoundary, beyond: Floats, step: float, outside: Mask
-) -> OnBoundary | None:
-    """Return the point at the edge of the range between a point and a place beyond."""
-    chord = beyond - here.place
-    edges = (beyond > 0.5).astype(np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(outside, (edges - here.place) / chord, np.inf)
-    number = int(np.argmin(reach))
-    guess = here.place + min(max(float(reach[number]), 0.0), 1.0) * chord
-    guess[number] = edges[number]
-    direction = np.zeros_like(guess)
-    direction[number] = np.sign(chord[number]) or 1.0
-    trial = equations.corrected(guess, direction, here.reference)
-    if trial is None or np.linalg.norm(trial.place - here.place) > 2.0 * step:
-        return None
-    if np.any((trial.shares < -1e-12) | (trial.shares > 1.0 + 1e-12)):
-        return None
-    onward = np.sign(trial.tangent @ here.tangent) or 1.0
-    return trial._replace(tangent=onward * trial.tangent)
-
-
-def _meets(here: OnBoundary, trial: OnBoundary, start: OnBoundary) -> bool:
-    """Whether the first point lies between two successive ones, in its direction."""
-    chord, away = trial.place - here.place, start.place - here.place
-    share = float(away @ chord) / float(chord @ chord)
-    if not 0.0 <= share <= 1.0 or trial.tangent @ start.tangent < SMOOTH:
-        return False
-    near = _cubic(here, trial, np.linspace(0.0, 1.0, 101))
-    return bool(np.min(np.linalg.norm(near - start.place, axis=1)) < SAME_CURVE)
 
 
 def _tests(kind: str, point: OnBoundary, of: OnBoundary) -> dict[str, float]:
@@ -425,14 +293,13 @@ def _null_test(name: str, point: OnBoundary, of: OnBoundary) -> float:
 
 def _located_between(
     equations: Equations, one: OnBoundary, other: OnBoundary
-) -> list[tuple[str, OnBoundary]]:
-    """Return kind and point of the points of codimension 2 between two points, in order."""
+) -> Following[list[tuple[str, OnBoundary]]]:
+    """Search kind and point of the points of codimension 2 between two points, in order."""
     before, after = (_tests(equations.kind, at, one) for at in (one, other))
+    names = [name for name, value in before.items() if value * after[name] < 0.0]
+    points = yield from together([_located(equations, one, other, name) for name in names])
     found = []
-    for name, value in before.items():
-        if value * after[name] >= 0.0:
-            continue
-        point = _located(equations, one, other, name)
+    for name, point in zip(names, points, strict=True):
         if point is None or (
             name in _WITH_PAIR and not _has_complex_pair(_others(equations.kind, point.multipliers))
         ):
@@ -460,8 +327,8 @@ def _has_complex_pair(multipliers: Complex) -> bool:
 
 def _located(
     equations: Equations, one: OnBoundary, other: OnBoundary, name: str
-) -> OnBoundary | None:
-    """Return the point between two points at which a test changes its sign (Illinois method)."""
+) -> Following[OnBoundary | None]:
+    """Search the point between two points at which a test changes its sign (Illinois method)."""
     begin: OnBoundary = one
     nearest: OnBoundary | None = None
     low, high = (_tests(equations.kind, at, begin)[name] for at in (one, other))
@@ -472,11 +339,14 @@ def _located(
             break
         share = 0.5 if number % 4 == 3 else low / (low - high)
         share = min(max(share, 1e-3), 1.0 - 1e-3)
-        middle = equations.corrected(one.place + share * chord, chord / length, one.reference)
+        direction = fixed_direction(equations, chord / length)
+        guess = one.place + share * chord
+        middle = yield from equations.correcting(guess, direction, one.reference)
         if middle is None:
             break
+        settled = nearest is not None and np.linalg.norm(middle.place - nearest.place) <= SETTLED
         nearest, value = middle, _tests(equations.kind, middle, begin)[name]
-        if value == 0.0:
+        if value == 0.0 or settled:
             break
         if (value > 0.0) == (low > 0.0):
             one, low, high = middle, value, high / 2.0

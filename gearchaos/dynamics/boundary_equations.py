@@ -6,21 +6,23 @@ flow.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import (
-    LaneSystem,
-    Outcome,
-    Plan,
-    gap_polynomials,
-    gaps_along,
-    integrate,
-)
+from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate
 
-from gearchaos.arrays import Complex, Floats
+from gearchaos.arrays import Complex, Floats, Mask
 from gearchaos.dynamics.arclength import DIFFERENCE, ROUNDING
+from gearchaos.dynamics.boundary_passages import (
+    PARAMETERS,
+    Following,
+    Passed,
+    Passing,
+    nearest_extremes,
+    passed_of,
+)
 from gearchaos.dynamics.orbits import CLOSED
+from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBLING
 
 STATE_DIFFERENCE = 1e-7
@@ -40,8 +42,6 @@ NEAR_ENOUGH = 1e-3
 
 NEAR_CIRCLE = 0.5
 """Largest distance of the product of a pair of multipliers from 1."""
-
-PARAMETERS = 2
 
 
 class Reference(NamedTuple):
@@ -98,15 +98,6 @@ class OnBoundary(NamedTuple):
         return self.place[-PARAMETERS:]
 
 
-class _Passed(NamedTuple):
-    """Orbits from some places: defects (places, states), monodromies, motions and systems."""
-
-    defect: Floats
-    monodromy: Floats
-    outcome: Outcome
-    system: LaneSystem
-
-
 class Equations(NamedTuple):
     """The equations of a boundary.
 
@@ -141,11 +132,17 @@ class Equations(NamedTuple):
 
         ``place`` and ``direction``: shape (states + 2,).
         """
-        passed = self._passed(place[np.newaxis], np.ones(1, dtype=bool))
+        return run(self.beginning(place, direction), passed_of)
+
+    def beginning(self, place: Floats, direction: Floats) -> Following[OnBoundary | None]:
+        """Return the search of `begun`."""
+        passed = yield from self._passing(place[np.newaxis], np.ones(1, dtype=bool))
         if not np.isfinite(passed.monodromy).all():
             return None
         reference = self._reference(passed, None)
-        return None if reference is None else self.corrected(place, direction, reference)
+        if reference is None:
+            return None
+        return (yield from self.correcting(place, direction, reference))
 
     def corrected(
         self, guess: Floats, direction: Floats, reference: Reference
@@ -155,13 +152,21 @@ class Equations(NamedTuple):
         ``guess`` and ``direction``: shape (states + 2,). Newton's method; its derivatives are kept
         while steps shrink fast. None where it does not converge.
         """
-        place, last, slopes, where = guess, np.inf, None, guess
+        return run(self.correcting(guess, direction, reference), passed_of)
+
+    def correcting(
+        self, guess: Floats, direction: Floats, reference: Reference
+    ) -> Following[OnBoundary | None]:
+        """Return the search of `corrected`."""
+        place, last, where = guess, np.inf, guess
+        slopes: Floats | None = None
         for _ in range(STEPS):
             if slopes is None:
-                passed, value, slopes = self._differentiated(place, reference)
+                passed, value, slopes = yield from self._differentiated(place, reference)
                 where = place
             else:
-                passed = self._passed(place[np.newaxis], np.ones(1, dtype=bool))
+                alone = np.ones(1, dtype=bool)
+                passed = yield from self._passing(place[np.newaxis], alone, reference.phase)
                 value = float(self._tests(passed, reference)[0])
             defect = np.append(passed.defect[0], value)
             if not (np.isfinite(defect).all() and np.isfinite(slopes).all()):
@@ -178,7 +183,7 @@ class Equations(NamedTuple):
             ):
                 place = place + step
                 if np.linalg.norm(place - where) > NEAR_ENOUGH:
-                    slopes = self._differentiated(place, reference)[2]
+                    _, _, slopes = yield from self._differentiated(place, reference)
                 return self._point(place, slopes, direction, passed, reference)
             if not length < 0.9 * last:
                 return None
@@ -193,20 +198,29 @@ class Equations(NamedTuple):
 
         ``place``: shape (states + 2,). Infinite if no gap has an extreme.
         """
+        states = self.scale.size
         plan = self.plan._replace(history_periods=self.plan.recorded_periods)
-        passed = self._replace(plan=plan)._passed(place[np.newaxis], np.zeros(1, dtype=bool))
-        gaps = gaps_along(passed.system, passed.outcome.history, plan.steps_per_period)
+        system = self.system_at(np.clip(place[np.newaxis, states:], 0.0, 1.0))
+        start = (place[:states] * self.scale)[np.newaxis]
+        history = integrate(system, start, plan).history
+        halves = gaps_along(system, history, plan.steps_per_period).half_clearance[0]
         found = np.inf
-        for element, half in enumerate(gaps.half_clearance[0]):
-            for flank in (2 * element, 2 * element + 1):
-                equations = self._replace(kind=GRAZING, flank=flank, plan=plan)
-                beyond, _ = _nearest_extreme(equations, passed, None)
-                away = float(np.nan_to_num(np.abs(beyond[0]), nan=np.inf))
-                found = min(found, away / (half or 1.0))
+        for flank in range(2 * halves.size):
+            at = np.array([flank]), np.full(1, np.nan)
+            beyond, _ = nearest_extremes(system, plan, history, *at)
+            away = float(np.nan_to_num(np.abs(beyond[0]), nan=np.inf))
+            found = min(found, away / (halves[flank // 2] or 1.0))
         return found
 
-    def _differentiated(self, place: Floats, reference: Reference) -> tuple[_Passed, float, Floats]:
-        """Return the orbit of a place, its test function, and all derivatives.
+    def _passing(self, places: Floats, whole: Mask, phase: float = np.nan) -> Following[Passed]:
+        """Search the orbits of places; ``whole`` (places,): whether the monodromy is needed."""
+        (passed,) = yield [Passing(self, places, whole, phase)]
+        return passed
+
+    def _differentiated(
+        self, place: Floats, reference: Reference
+    ) -> Following[tuple[Passed, float, Floats]]:
+        """Search the orbit of a place, its test function, and all derivatives.
 
         The derivatives have the shape (states + 1, states + 2).
         """
@@ -219,7 +233,7 @@ class Equations(NamedTuple):
         # A grazing is differentiated without the tangent flow of the displaced orbits.
         whole = np.full(count + 1, self.kind != GRAZING)
         whole[0] = True
-        passed = self._passed(places, whole)
+        passed = yield from self._passing(places, whole, reference.phase)
         values = self._tests(passed, reference)
         states = self.scale.size
         slopes = np.zeros((states + 1, count))
@@ -230,56 +244,34 @@ class Equations(NamedTuple):
         slopes[-1] = (values[1:] - values[0]) / steps
         return passed, float(values[0]), slopes
 
-    def _passed(self, places: Floats, whole: Any) -> _Passed:
-        """Integrate the orbits of places; ``whole`` (places,): whether the monodromy is needed."""
-        states = self.scale.size
-        counts = np.where(whole, states, 1)
-        first = np.cumsum(counts) - counts
-        shares = np.clip(places[:, -PARAMETERS:], 0.0, 1.0)
-        lanes = np.repeat(np.arange(len(places)), counts)
-        tangents = np.eye(states)[np.arange(lanes.size) - first[lanes]]
-        of_places = self.system_at(shares)
-        system = of_places.of(lanes)
-        start = places[lanes, :states] * self.scale
-        outcome = integrate(system, start, self.plan, tangent_start=tangents)
-        outcome = outcome.every(system.repeats_after)
-        ends = outcome.section[first, -1] / self.scale
-        columns = outcome.end_tangent * np.exp(np.sum(outcome.growth, axis=1))[:, np.newaxis]
-        monodromy = np.full((len(places), states, states), np.nan)
-        for number in np.flatnonzero(whole):
-            of = columns[first[number] : first[number] + states]
-            monodromy[number] = of.T * self.scale / self.scale[:, np.newaxis]
-        some = outcome._replace(section=outcome.section[first], history=outcome.history[first])
-        return _Passed(ends - places[:, :states], monodromy, some, of_places)
-
-    def _tests(self, passed: _Passed, reference: Reference) -> Floats:
+    def _tests(self, passed: Passed, reference: Reference) -> Floats:
         """Return the test function of each place, (places,)."""
         if self.kind == GRAZING:
-            return _nearest_extreme(self, passed, reference.phase)[0]
+            return passed.beyond
+        if not np.isfinite(passed.monodromy).all():
+            return np.full(len(passed.monodromy), np.nan)
         if self.kind == NEIMARK_SACKER:
-            pairs = [_pair(np.linalg.eigvals(one), reference.cosine) for one in passed.monodromy]
-            return np.array([(one * other).real - 1.0 for one, other in pairs])
-        return np.array([self._bordered(one, reference)[-1] for one in passed.monodromy])
+            pairs = _pairs(np.linalg.eigvals(passed.monodromy), reference.cosine)
+            return np.asarray((pairs[:, 0] * pairs[:, 1]).real - 1.0)
+        return self._bordered(passed.monodromy, reference)
 
-    def _bordered(
-        self, monodromy: Floats, reference: Reference, transposed: bool = False
-    ) -> Floats:
-        """Return the solution of the bordered equations: a null vector and the test function."""
+    def _bordered(self, monodromy: Floats, reference: Reference) -> Floats:
+        """Return the last unknown of the bordered equations of each matrix, (places,)."""
         states = self.scale.size
-        border = np.zeros((states + 1, states + 1))
-        border[:states, :states] = monodromy - self.multiplier * np.eye(states)
-        border[:states, -1], border[-1, :states] = reference.left, reference.right
+        border = np.zeros((len(monodromy), states + 1, states + 1))
+        border[:, :states, :states] = monodromy - self.multiplier * np.eye(states)
+        border[:, :states, -1], border[:, -1, :states] = reference.left, reference.right
         try:
-            return np.linalg.solve(border.T if transposed else border, np.eye(states + 1)[-1])
+            return np.asarray(np.linalg.solve(border, np.eye(states + 1)[:, -1:])[:, -1, 0])
         except np.linalg.LinAlgError:
-            return np.full(states + 1, np.nan)
+            return np.full(len(monodromy), np.nan)
 
     @property
     def multiplier(self) -> float:
         """The multiplier at a fold or a period doubling."""
         return {FOLD: 1.0, PERIOD_DOUBLING: -1.0}.get(self.kind, np.nan)
 
-    def _reference(self, passed: _Passed, before: Reference | None) -> Reference | None:
+    def _reference(self, passed: Passed, before: Reference | None) -> Reference | None:
         """Return what the test function is continued from beyond an orbit; None if there is none.
 
         ``before``: the reference of a neighbouring point, None at the beginning of a boundary.
@@ -295,20 +287,18 @@ class Equations(NamedTuple):
                 ]
             return Reference(*vectors)
         if self.kind == NEIMARK_SACKER:
-            one, other = _pair(
-                np.linalg.eigvals(monodromy), None if before is None else before.cosine
-            )
+            cosine = None if before is None else before.cosine
+            one, other = _pairs(np.linalg.eigvals(monodromy[np.newaxis]), cosine)[0]
             return None if np.isnan(one) else Reference(cosine=float((one + other).real / 2.0))
-        phase = None if before is None else before.phase
-        values, phases = _nearest_extreme(self, passed, phase)
-        return Reference(phase=float(phases[0])) if np.isfinite(values[0]) else None
+        there = np.isfinite(passed.beyond[0])
+        return Reference(phase=float(passed.phase[0])) if there else None
 
     def _point(
         self,
         place: Floats,
         slopes: Floats,
         direction: Floats,
-        passed: _Passed,
+        passed: Passed,
         before: Reference,
     ) -> OnBoundary | None:
         """Return the point at a place where all equations hold."""
@@ -320,7 +310,7 @@ class Equations(NamedTuple):
             return None
         multipliers = np.linalg.eigvals(passed.monodromy[0]).astype(np.complex128)
         multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
-        section = passed.outcome.section[0]
+        section = passed.section[0]
         halfway = np.zeros(0)
         if self.periods % 2 == 0:
             halfway = section[self.periods // 2 - 1] / self.scale - place[:states]
@@ -335,58 +325,25 @@ class Equations(NamedTuple):
         return self._replace(kind=GRAZING, flank=flank, plan=plan)
 
 
-def _pair(multipliers: Any, cosine: float | None) -> tuple[complex, complex]:
-    """Return the pair of multipliers, complex or real, whose product is nearest to 1.
+def _pairs(multipliers: Complex, cosine: float | None) -> Complex:
+    """Return the pairs of multipliers, complex or real, with products nearest to 1, (places, 2).
 
-    ``cosine``: their mean at a neighbouring point; None for the first point, where the pair is
-    complex. NaN if no pair has a product near 1.
+    ``multipliers``: shape (places, states); ``cosine``: their mean at a neighbouring point; None
+    for the first point, where the pair is complex. NaN if no pair has a product near 1.
     """
-    values = sorted(np.asarray(multipliers, dtype=np.complex128), key=lambda one: one.imag)
-    best, found = np.inf, (complex(np.nan), complex(np.nan))
-    for number, one in enumerate(values):
-        for other in values[:number]:
-            conjugate = one.imag != 0.0 and abs(one - other.conjugate()) <= 1e-9 * abs(one)
-            real = one.imag == 0.0 and other.imag == 0.0 and cosine is not None
-            away = abs((one * other).real - 1.0)
-            if not (conjugate or real) or away > NEAR_CIRCLE:
-                continue
-            distance = away + (0.0 if cosine is None else abs((one + other).real / 2.0 - cosine))
-            if distance < best:
-                best, found = distance, (one, other)
+    values = np.asarray(multipliers, dtype=np.complex128)
+    values = np.take_along_axis(values, np.argsort(values.imag, axis=1, kind="stable"), axis=1)
+    second, first = np.tril_indices(values.shape[1], -1)
+    one, other = values[:, second], values[:, first]
+    allowed = (one.imag != 0.0) & (np.abs(one - other.conj()) <= 1e-9 * np.abs(one))
+    if cosine is not None:
+        allowed |= (one.imag == 0.0) & (other.imag == 0.0)
+    distance = np.abs((one * other).real - 1.0)
+    allowed &= distance <= NEAR_CIRCLE
+    if cosine is not None:
+        distance = distance + np.abs((one + other).real / 2.0 - cosine)
+    distance = np.where(allowed, distance, np.inf)
+    rows, best = np.arange(len(values)), np.argmin(distance, axis=1)
+    found = np.stack([one[rows, best], other[rows, best]], axis=1)
+    found[~allowed.any(axis=1)] = np.nan
     return found
-
-
-def _nearest_extreme(
-    equations: Equations, passed: _Passed, phase: float | None
-) -> tuple[Floats, Floats]:
-    """Return how far the extreme of a gap lies beyond a flank, and its phase, (lanes,) each.
-
-    Of several extremes that is the one nearest to a phase in steps; without a phase, the one
-    nearest to the flank. NaN where the gap has no extreme.
-    """
-    plan, system, history = equations.plan, passed.system, passed.outcome.history
-    gaps = gaps_along(system, history, plan.steps_per_period)
-    element, back = divmod(equations.flank, 2)
-    flank = (-1.0 if back else 1.0) * gaps.half_clearance[:, element]
-    rate, value = gaps.rate[:, :, element], gaps.value[:, :, element]
-    turns = rate[:, :-1] * rate[:, 1:] <= 0.0
-    numbers = np.arange(turns.shape[1])
-    if phase is None:
-        away = np.abs(value[:, :-1] - flank[:, np.newaxis])
-    else:
-        away = np.abs(numbers + 0.5 - phase)[np.newaxis]
-        away = np.broadcast_to(np.minimum(away, turns.shape[1] - away), turns.shape)
-    samples = np.argmin(np.where(turns, away, np.inf), axis=1)
-    terms = gap_polynomials(system, plan, history, gaps, (samples, element))
-    slopes = terms[:, 1:] * np.arange(1, terms.shape[1])
-    bends = slopes[:, 1:] * np.arange(1, slopes.shape[1])
-    begin, end = (rate[np.arange(samples.size), samples + n] for n in (0, 1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = np.clip(np.nan_to_num(-(end + begin) / (end - begin)), -1.0, 1.0)
-        for _ in range(6):
-            bend = np.polynomial.polynomial.polyval(at, bends.T, tensor=False)
-            slope = np.polynomial.polynomial.polyval(at, slopes.T, tensor=False)
-            at = np.clip(at - np.nan_to_num(slope / bend), -1.5, 1.5)
-    beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - flank
-    there = turns.any(axis=1)
-    return np.where(there, beyond, np.nan), samples + 0.5 * (at + 1.0)

@@ -5,25 +5,25 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import METHODS, LaneSystem, steps_taken
+from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Floats
-from gearchaos.dynamics.boundaries import Located, TracedBoundary, trace_boundary, unstarted
-from gearchaos.dynamics.boundary_equations import (
-    PARAMETERS,
-    Equations,
-    OnBoundary,
-    Reference,
-)
+from gearchaos.dynamics.arclength import CurvePoint
+from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
+from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
+from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import Special, TracedBranch
+from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
+from gearchaos.engine.map_changes import MapChange, changes_of
 from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
-from gearchaos.engine.running import one_thread, run
+from gearchaos.engine.running import one_thread
+from gearchaos.engine.running import run as compute
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
@@ -32,7 +32,13 @@ from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.progress import progress, say
 from gearchaos.records.boundary import BOUNDARY_KINDS, RESONANCES, Boundary, BoundaryPoint
-from gearchaos.records.branch import BRANCH_POINT, GRAZING, NEIMARK_SACKER
+from gearchaos.records.branch import (
+    BRANCH_POINT,
+    FOLD,
+    GRAZING,
+    NEIMARK_SACKER,
+    PERIOD_DOUBLING,
+)
 from gearchaos.records.period import coordinate_scale
 from gearchaos.results.files.boundary_file import BoundarySet
 from gearchaos.results.reading.result import Result
@@ -43,6 +49,9 @@ LINES, PERIODS = 4, 1
 
 COARSE = 24
 """Values of each parameter of the map that is computed from a configuration."""
+
+SIDES = "driving", "back"
+"""The flanks of an element in the order of their numbers."""
 
 APPROXIMATE = 1e-4
 """Length of the stretch of a branch in which a start is located; the equations then correct it."""
@@ -107,6 +116,7 @@ def find_boundaries(
     ]
     with one_thread(), progress(len(places), unit="lines") as bar:
         try:
+            search.from_changes(result)
             for number, share in places:
                 check()
                 search.along_line(result, number, share)
@@ -129,7 +139,7 @@ def coarse_map(config: Configuration) -> Result:
             f"{config.source}: has no [second_sweep]; boundaries are curves over two swept "
             "parameters: add it, or run gearchaos branches"
         )
-    return run(_small(config, COARSE))
+    return compute(_small(config, COARSE))
 
 
 def _small(config: Configuration, count: int) -> Configuration:
@@ -179,6 +189,21 @@ class _Ranges(NamedTuple):
         return BranchRange(systems, float(self.low[1 - number]), float(self.high[1 - number]))
 
 
+class _Begun(NamedTuple):
+    """The beginning of a boundary: the point that was found, from a guess or a special point."""
+
+    equations: Equations
+    start: OnBoundary | None
+    guess: Floats = np.zeros(0)
+    special: CurvePoint | None = None
+
+    @property
+    def within(self) -> bool:
+        """Whether the point lies within both ranges."""
+        shares = np.zeros(0) if self.start is None else self.start.shares
+        return bool(np.all((shares >= 0.0) & (shares <= 1.0)))
+
+
 class _BoundarySearch:
     """The boundaries that are known so far; ``result`` gives the scales of the states."""
 
@@ -213,51 +238,137 @@ class _BoundarySearch:
         )
         across = known.axis_name(self.over.parameters[1 - number])
         branches.follow(branches.motions(line, across))
-        for branch in branches.found:
-            for special in branch.specials:
-                check()
-                self._follow(branch, special, number, place)
+        self._follow(
+            [
+                self._from_special(branch, special, number, place)
+                for branch in branches.found
+                for special in branch.specials
+                if special.kind != BRANCH_POINT
+            ]
+        )
         say(f"{axis} = {value:.6g}: {len(branches.found)} branches; {len(self.found)} boundaries")
 
-    def _follow(self, branch: TracedBranch, special: Special, number: int, place: float) -> None:
-        """Follow the boundary through a special point of a branch, unless it is known."""
-        if special.kind == BRANCH_POINT:
-            return
+    def from_changes(self, result: Result) -> None:
+        """Follow boundaries from changes of the motion between neighbouring cells of a map."""
+        axes = [known.axis_name(one) for one in self.over.parameters]
+        ends = np.array([self.over.low, self.over.high])
+        impacts = [f"impacts_{side}_{element}" for element in self.run.elements for side in SIDES]
+        if any(name not in result.variables for name in impacts):
+            impacts = []
+        changes = changes_of(result, axes, ends, self.longest, impacts)
+        if changes:
+            kinds = self._kinds(changes)
+            self._follow(
+                [self._from_change(*one) for one in zip(changes, kinds, strict=True) if one[1]]
+            )
+        say(f"{len(changes)} changes of the map: {len(self.found)} boundaries")
+
+    def _kinds(self, changes: list[MapChange]) -> list[str]:
+        """Return the kind of boundary that is near the motion of each change."""
+        requests = [
+            Passing(
+                self._equations(one.period, FOLD),
+                np.append(one.state / self.scale, one.shares)[np.newaxis],
+                np.ones(1, dtype=bool),
+            )
+            for one in changes
+        ]
+        found = []
+        for change, passed in zip(changes, passed_of(requests), strict=True):
+            kind = GRAZING if change.flank >= 0 else ""
+            if not kind and np.isfinite(passed.monodromy).all():
+                values = np.linalg.eigvals(passed.monodromy[0])
+                leading = complex(values[np.argmax(np.abs(values))])
+                kind = FOLD if leading.real > 0.0 else PERIOD_DOUBLING
+                kind = NEIMARK_SACKER if leading.imag else kind
+            found.append(kind)
+        return found
+
+    def _equations(self, period: int, kind: str, flank: int = -1) -> Equations:
+        """Return the equations of a boundary."""
         usual, most = self.steps
-        plan = branch.curve.plan._replace(contact=False, steps_per_period=usual)
-        equations = Equations(
-            self.over.system_at, plan, branch.period, self.scale, special.kind, fixed=self.fixed
-        )
-        if special.kind == GRAZING:
-            equations = equations.grazing(special.flank, most)
-        states, direction = self.scale.size, np.zeros(self.scale.size + PARAMETERS)
-        direction[states + number] = 1.0
+        whole = period * self.run.lanes.repeats_after
+        plan = Plan(usual, 0, whole, whole, tangent=True, method=self.run.plan.method)
+        equations = Equations(self.over.system_at, plan, period, self.scale, kind, fixed=self.fixed)
+        return equations.grazing(flank, most) if kind == GRAZING else equations
+
+    def _from_change(self, change: MapChange, kind: str) -> Following["_Begun"]:
+        """Search the point of a boundary next to a change of a map."""
+        equations = self._equations(change.period, kind, change.flank)
+        guess = np.append(change.state / self.scale, change.shares)
+        start = yield from equations.beginning(guess, self._along(change.number))
+        return _Begun(equations, start, guess, None)
+
+    def _from_special(
+        self, branch: TracedBranch, special: Special, number: int, place: float
+    ) -> Following["_Begun"]:
+        """Search the point of a boundary at a special point of a branch."""
+        equations = self._equations(branch.period, special.kind, special.flank)
         shares = np.full(PARAMETERS, special.point.share)
         shares[number] = place
         guess = np.concatenate([special.point.place[:-1], shares])
-        start = equations.begun(guess, direction)
-        if start is None:
-            self.found.append(unstarted(equations, guess, special.point))
-            return
-        self._add(equations, start)
+        start = yield from equations.beginning(guess, self._along(number))
+        return _Begun(equations, start, guess, special.point)
 
-    def _add(self, equations: Equations, start: OnBoundary) -> None:
-        """Follow the boundary through a point, unless it is known, and what begins on it."""
-        if any(_alike(one.equations, equations) and one.holds(start) for one in self.found):
-            return
-        boundary = trace_boundary(equations, start)
-        self.found.append(boundary)
-        if equations.kind == NEIMARK_SACKER:
-            return
-        turning = equations._replace(kind=NEIMARK_SACKER, flank=-1)
-        for located in boundary.located:
-            check()
-            if located.kind in RESONANCES:
-                # The curve of pairs with the product 1 passes through the resonance.
+    def _along(self, number: int) -> Floats:
+        """Return the direction in which a parameter alone grows, (states + 2,)."""
+        direction = np.zeros(self.scale.size + PARAMETERS)
+        direction[self.scale.size + number] = 1.0
+        return direction
+
+    def _follow(self, searches: list[Following["_Begun"]]) -> None:
+        """Follow the boundaries through points that lie on none that is known."""
+        new: list[tuple[Equations, list[OnBoundary]]] = []
+        begun = run(together(searches), passed_of)
+        held = run(together([self._held(one) for one in begun]), passed_of)
+        for one, is_held in zip(begun, held, strict=True):
+            if one.start is None and one.special is not None:
+                self.found.append(unstarted(one.equations, one.guess, one.special))
+            if one.start is None or is_held or not one.within:
+                continue
+            same = [starts for equations, starts in new if _alike(equations, one.equations)]
+            if same:
+                same[0].append(one.start)
+            else:
+                new.append((one.equations, [one.start]))
+        known = len(self.found)
+        self._trace(new)
+        self._trace(self._turning(self.found[known:]))
+
+    def _trace(self, starts: list[tuple[Equations, list[OnBoundary]]]) -> None:
+        """Follow the boundaries through some points of each kind side by side."""
+        traced = run(together([tracing(*one) for one in starts]), passed_of)
+        for boundary in (one for some in traced for one in some):
+            # Orbits of longer periods are the same at each of their section points.
+            middle = boundary.points[len(boundary.points) // 2]
+            if not run(self._held(_Begun(boundary.equations, middle)), passed_of):
+                self.found.append(boundary)
+
+    def _held(self, begun: "_Begun") -> Following[bool]:
+        """Search whether a point lies on a boundary that is known."""
+        for one in self.found:
+            if begun.start is not None and _alike(one.equations, begun.equations):
+                if (yield from one.holding(begun.start)):
+                    return True
+        return False
+
+    def _turning(
+        self, boundaries: list[TracedBoundary]
+    ) -> list[tuple[Equations, list[OnBoundary]]]:
+        """Return points of curves of pairs with the product 1, at resonances on boundaries."""
+        found: list[tuple[Equations, list[OnBoundary]]] = []
+        for boundary in boundaries:
+            if boundary.equations.kind == NEIMARK_SACKER:
+                continue
+            turning = boundary.equations._replace(kind=NEIMARK_SACKER, flank=-1)
+            for located in boundary.located:
+                if located.kind not in RESONANCES:
+                    continue
                 point, pair = located.point, Reference(cosine=RESONANCES[located.kind])
                 begun = turning.corrected(point.place, point.tangent, pair)
                 if begun is not None and not self._passes(turning, begun):
-                    self._add(turning, begun)
+                    found.append((turning, [begun]))
+        return found
 
     def _passes(self, equations: Equations, start: OnBoundary) -> bool:
         """Whether a known boundary of the same kind passes by the beginning of another."""

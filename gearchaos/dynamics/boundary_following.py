@@ -1,0 +1,257 @@
+"""Points of boundaries over two parameters, followed from many starts side by side.
+
+Every start is followed in both directions. Where two halves meet, they are parts of one boundary.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gearchaos.arrays import Floats, Mask
+from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
+from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
+from gearchaos.dynamics.side_by_side import together
+from gearchaos.records.boundary import (
+    CORNER,
+    NO_EXTREME,
+    STRONG_RESONANCE_11,
+    STRONG_RESONANCE_12,
+)
+from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST, TOO_MANY
+
+FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-5
+"""Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
+
+SMOOTH, TURN = 0.9, 0.3
+"""Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
+
+ASIDE = 0.3
+"""Largest share of a step by which a point may lie aside of its prediction."""
+
+MOST_POINTS = 1000
+"""Largest number of points computed along one direction of a boundary."""
+
+SAME_CURVE, SAME_PLACE = 2e-3, 1e-6
+"""Largest distance of halves that meet, relative to a step if that is longer, and of one start."""
+
+GRAZES = 1e-3
+"""Distance of a gap from a flank, in half clearances, at which a boundary ends at a grazing."""
+
+HALF_RETURN = 1e-2
+"""Half-period return distance below which a boundary ends in orbits of half the period."""
+
+STEEP = 0.2
+"""Least component of a tangent by a parameter that stays fixed while a point is corrected."""
+
+
+class Path(NamedTuple):
+    """Points of a boundary in the order of the curve, and why it ends at its first and its last."""
+
+    points: list[OnBoundary]
+    ends: tuple[str, str]
+
+
+class _Half:
+    """What is known of a boundary on one side of a start.
+
+    ``other``: the half on the other side; ``met``: the half that it has met; ``end``: why it ends.
+    """
+
+    def __init__(self, start: OnBoundary) -> None:
+        self.points = [start]
+        self.end = ""
+        self.other: _Half = self
+        self.met: _Half | None = None
+
+
+def following(equations: Equations, starts: Sequence[OnBoundary]) -> Following[list[Path]]:
+    """Follow boundaries from some of their points in both directions, within both ranges."""
+    halves: list[_Half] = []
+    for start in starts:
+        if any(np.linalg.norm(one.points[0].place - start.place) < SAME_PLACE for one in halves):
+            continue
+        pair = _Half(start), _Half(_turned(start))
+        pair[0].other, pair[1].other = pair[1], pair[0]
+        halves += pair
+    yield from together([_advance(equations, one, halves) for one in halves])
+    return _paths(halves)
+
+
+def _paths(halves: list[_Half]) -> list[Path]:
+    """Join the halves that have met."""
+    paths, joined = [], set[int]()
+    for start in halves:
+        if id(start) in joined:
+            continue
+        first = start
+        while first.met is not None and first.met.other is not start:
+            first = first.met.other
+        closed = first.met is not None
+        points: list[OnBoundary] = []
+        half: _Half | None = first
+        while half is not None and id(half) not in joined:
+            joined.update((id(half), id(half.other)))
+            points += [_turned(one) for one in half.points[:0:-1]] + half.other.points
+            last, half = half.other, half.other.met
+        ends = (CLOSED_CURVE, CLOSED_CURVE) if closed else (first.end, last.end)
+        paths.append(Path(points + points[:1] if closed else points, ends))
+    return paths
+
+
+def _turned(point: OnBoundary) -> OnBoundary:
+    """Return a point with the opposite tangent."""
+    return point._replace(tangent=-point.tangent)
+
+
+def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Following[None]:
+    """Follow a half up to its end, or until it meets another one."""
+    points, step, bend = half.points, FIRST_STEP, np.zeros_like(half.points[0].place)
+    while not half.end and half.met is None:
+        here = points[-1]
+        trial, leaves = yield from _next(equations, here, step, bend)
+        if half.met is not None:
+            return
+        if trial is None or trial.tangent @ here.tangent < SMOOTH:
+            step /= 2.0
+            half.end = _why_lost(equations, here) if step < SHORTEST else ""
+            continue
+        if here.halfway.size and here.halfway @ trial.halfway <= 0.0:
+            near = np.max(np.abs(here.halfway)) < HALF_RETURN
+            half.end, step = (HALVING if near else ""), step / 2.0
+            continue
+        met = _met(here, trial, half, halves)
+        if met is not None:
+            half.met, met.met, met.end = met, half, ""
+            return
+        length = float(np.linalg.norm(trial.place - here.place))
+        points += [trial] if length > 0.0 else []
+        half.end = EDGE if leaves else _end_at(points)
+        bend = (trial.tangent - here.tangent) / length if length > 0.0 else 0.0 * bend
+        turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
+        step = min(length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0), LONGEST)
+
+
+def _end_at(points: list[OnBoundary]) -> str:
+    """Return why a half ends at its last point, empty if it goes on."""
+    if len(points) > 2 and all(abs(one.reference.cosine) > 1.0 + 1e-9 for one in points[-2:]):
+        # The curve continues as one of neutral saddles, which is no boundary.
+        onward = points[-1].reference.cosine > 0.0
+        return STRONG_RESONANCE_11 if onward else STRONG_RESONANCE_12
+    return TOO_MANY if len(points) >= MOST_POINTS else ""
+
+
+def _met(here: OnBoundary, trial: OnBoundary, half: _Half, halves: list[_Half]) -> _Half | None:
+    """Return the half whose last point lies between two points and that comes from ahead."""
+    chord = trial.place - here.place
+    square = float(chord @ chord)
+    others = [one for one in halves if one is not half and one.met is None]
+    if not others or square == 0.0:
+        return None
+    away = np.array([one.points[-1].place for one in others]) - here.place
+    facing = np.array([one.points[-1].tangent for one in others]) @ trial.tangent <= -SMOOTH
+    along = away @ chord / square
+    aside = np.linalg.norm(away - along[:, np.newaxis] * chord, axis=1)
+    (near,) = np.nonzero(
+        facing & (along > 0.0) & (along <= 1.0) & (aside <= ASIDE * np.sqrt(square))
+    )
+    for at in near[np.argsort(along[near], kind="stable")]:
+        target = others[at].points[-1].place
+        curve = cubic(here, trial, np.linspace(0.0, 1.0, 101))
+        if np.min(np.linalg.norm(curve - target, axis=1)) < SAME_CURVE + 0.02 * np.sqrt(square):
+            return others[at]
+    return None
+
+
+def _why_lost(equations: Equations, here: OnBoundary) -> str:
+    """Return why no further point is found."""
+    if here.halfway.size and np.max(np.abs(here.halfway)) < HALF_RETURN:
+        return HALVING
+    if equations.kind == GRAZING:
+        return NO_EXTREME
+    # The test function has no derivative where a further flank grazes.
+    return CORNER if equations.nearest_flank(here.place) < GRAZES else LOST
+
+
+def _next(
+    equations: Equations, here: OnBoundary, step: float, bend: Floats
+) -> Following[tuple[OnBoundary | None, bool]]:
+    """Search the next point of a boundary, or None, and whether it lies at an edge."""
+    ahead = here.place + step * here.tangent + 0.5 * step**2 * bend
+    guess, direction = among_columns(equations, ahead, here.tangent, 0.5 * step)
+    outside = (guess < 0.0) | (guess > 1.0)
+    outside[:-PARAMETERS] = False
+    if not outside.any():
+        trial = yield from equations.correcting(guess, direction, here.reference)
+        if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
+            return None, False
+        if np.all((trial.shares >= 0.0) & (trial.shares <= 1.0)):
+            return trial, False
+        outside = (trial.place < 0.0) | (trial.place > 1.0)
+        outside[:-PARAMETERS] = False
+        guess = trial.place
+    return (yield from _at_edge(equations, here, guess, step, outside)), True
+
+
+def fixed_direction(equations: Equations, tangent: Floats) -> Floats:
+    """Return the direction normal to which a point is corrected.
+
+    Where flow maps depend on one of the parameters, this parameter stays fixed if the curve is not
+    nearly normal to it: each further value would need maps of its own.
+    """
+    direction, number = tangent, equations.fixed
+    if number >= 0 and abs(tangent[number - PARAMETERS]) > STEEP:
+        direction = np.zeros_like(tangent)
+        direction[number - PARAMETERS] = np.sign(tangent[number - PARAMETERS])
+    return direction
+
+
+def among_columns(
+    equations: Equations, guess: Floats, tangent: Floats, reach: float
+) -> tuple[Floats, Floats]:
+    """Return a guess that may lie up to ``reach`` along the tangent, and how it is corrected.
+
+    Where a parameter stays fixed, it takes a value with few binary digits. Many points then have
+    the same value, and share their flow maps.
+    """
+    direction, number = fixed_direction(equations, tangent), equations.fixed - PARAMETERS
+    if direction is tangent:
+        return guess, direction
+    grid = 2.0 ** np.floor(np.log2(reach * abs(tangent[number])))
+    moved = round(float(guess[number]) / grid) * grid - guess[number]
+    guess = guess + moved / tangent[number] * tangent
+    guess[number] = round(float(guess[number]) / grid) * grid
+    return guess, direction
+
+
+def _at_edge(
+    equations: Equations, here: OnBoundary, beyond: Floats, step: float, outside: Mask
+) -> Following[OnBoundary | None]:
+    """Search the point at the edge of the range between a point and a place beyond."""
+    chord = beyond - here.place
+    edges = (beyond > 0.5).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(outside, (edges - here.place) / chord, np.inf)
+    number = int(np.argmin(reach))
+    guess = here.place + min(max(float(reach[number]), 0.0), 1.0) * chord
+    guess[number] = edges[number]
+    direction = np.zeros_like(guess)
+    direction[number] = np.sign(chord[number]) or 1.0
+    trial = yield from equations.correcting(guess, direction, here.reference)
+    if trial is None or np.linalg.norm(trial.place - here.place) > 2.0 * step:
+        return None
+    if np.any((trial.shares < -1e-12) | (trial.shares > 1.0 + 1e-12)):
+        return None
+    onward = np.sign(trial.tangent @ here.tangent) or 1.0
+    return trial._replace(tangent=onward * trial.tangent)
+
+
+def cubic(one: OnBoundary, other: OnBoundary, share: Floats) -> Floats:
+    """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
+    length = np.linalg.norm(other.place - one.place)
+    t = share[:, np.newaxis]
+    return np.asarray(
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * one.place
+        + t**2 * (3.0 - 2.0 * t) * other.place
+        + length * t * (1.0 - t) * ((1.0 - t) * one.tangent - t * other.tangent)
+    )
