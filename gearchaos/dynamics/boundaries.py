@@ -55,7 +55,7 @@ TESTS = {
 FLAT = 1e-3
 """Largest distance of a boundary from the line between two points, in shares of both ranges."""
 
-SETTLED = 1e-8
+SETTLED = 2e-10
 """Distance of two successive trials below which the next one would change less than `LOCATED`."""
 
 _WITH_PAIR = (FOLD_NEIMARK_SACKER, FLIP_NEIMARK_SACKER, GRAZING_NEIMARK_SACKER)
@@ -94,6 +94,16 @@ class TracedBoundary(NamedTuple):
     positions: Floats
     located: list[Located]
     ends: tuple[str, str]
+
+    @property
+    def period(self) -> int:
+        """Period of the orbits in excitation periods."""
+        return self.equations.periods
+
+    @property
+    def shares(self) -> Floats:
+        """Shares of both ranges at its points, (points, 2)."""
+        return self.places[:, -PARAMETERS:]
 
     def holding(self, start: OnBoundary) -> Following[bool]:
         """Search whether a point of the same kind, period and flank lies on the boundary."""

@@ -41,7 +41,7 @@ GRAZES = 1e-3
 HALF_RETURN = 1e-2
 """Half-period return distance below which a boundary ends in orbits of half the period."""
 
-STEEP = 0.2
+STEEP = 0.03
 """Least component of a tangent by a parameter that stays fixed while a point is corrected."""
 
 

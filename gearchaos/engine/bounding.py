@@ -17,7 +17,7 @@ from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
-from gearchaos.engine.map_changes import MapChange, changes_of
+from gearchaos.engine.map_changes import Changes, MapChange, changes_of
 from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
@@ -52,6 +52,9 @@ COARSE = 24
 
 SIDES = "driving", "back"
 """The flanks of an element in the order of their numbers."""
+
+NEAR_FOLD = 0.3
+"""Least real multiplier of a motion in a cell that may lie next to a fold."""
 
 APPROXIMATE = 1e-4
 """Length of the stretch of a branch in which a start is located; the equations then correct it."""
@@ -256,33 +259,37 @@ class _BoundarySearch:
         if any(name not in result.variables for name in impacts):
             impacts = []
         changes = changes_of(result, axes, ends, self.longest, impacts)
-        if changes:
-            kinds = self._kinds(changes)
-            self._follow(
-                [self._from_change(*one) for one in zip(changes, kinds, strict=True) if one[1]]
-            )
-        say(f"{len(changes)} changes of the map: {len(self.found)} boundaries")
+        left, count = changes, len(changes.flank)
+        while left.flank.size:
+            check()
+            before, chosen = len(self.found), left.spread(self.fixed)
+            self._follow(self._from_changes(left.of(chosen)))
+            open_still = np.ones(left.flank.size, dtype=bool)
+            open_still[chosen] = False
+            for one in self.found[before:]:
+                same = (left.flank == one.equations.flank) & (left.period == one.period)
+                open_still &= ~(same & left.beside(one.shares))
+            left = left.of(open_still)
+            if len(self.found) == before:
+                break
+        say(f"{count} changes of the map: {len(self.found)} boundaries")
 
-    def _kinds(self, changes: list[MapChange]) -> list[str]:
-        """Return the kind of boundary that is near the motion of each change."""
+    def _from_changes(self, changes: Changes) -> list[Following["_Begun"]]:
+        """Return the searches of boundaries next to changes of a map."""
+        some = [*changes.each()]
         requests = [
             Passing(
                 self._equations(one.period, FOLD),
                 np.append(one.state / self.scale, one.shares)[np.newaxis],
                 np.ones(1, dtype=bool),
             )
-            for one in changes
+            for one in some
         ]
-        found = []
-        for change, passed in zip(changes, passed_of(requests), strict=True):
-            kind = GRAZING if change.flank >= 0 else ""
-            if not kind and np.isfinite(passed.monodromy).all():
-                values = np.linalg.eigvals(passed.monodromy[0])
-                leading = complex(values[np.argmax(np.abs(values))])
-                kind = FOLD if leading.real > 0.0 else PERIOD_DOUBLING
-                kind = NEIMARK_SACKER if leading.imag else kind
-            found.append(kind)
-        return found
+        return [
+            self._from_change(one, kind)
+            for one, passed in zip(some, passed_of(requests), strict=True)
+            for kind in _kinds(one, passed.monodromy[0])
+        ]
 
     def _equations(self, period: int, kind: str, flank: int = -1) -> Equations:
         """Return the equations of a boundary."""
@@ -331,9 +338,9 @@ class _BoundarySearch:
                 same[0].append(one.start)
             else:
                 new.append((one.equations, [one.start]))
-        known = len(self.found)
+        before = len(self.found)
         self._trace(new)
-        self._trace(self._turning(self.found[known:]))
+        self._trace(self._turning(self.found[before:]))
 
     def _trace(self, starts: list[tuple[Equations, list[OnBoundary]]]) -> None:
         """Follow the boundaries through some points of each kind side by side."""
@@ -347,9 +354,9 @@ class _BoundarySearch:
     def _held(self, begun: "_Begun") -> Following[bool]:
         """Search whether a point lies on a boundary that is known."""
         for one in self.found:
-            if begun.start is not None and _alike(one.equations, begun.equations):
-                if (yield from one.holding(begun.start)):
-                    return True
+            same = begun.start is not None and _alike(one.equations, begun.equations)
+            if same and (yield from one.holding(begun.start)):
+                return True
         return False
 
     def _turning(
@@ -440,6 +447,22 @@ class _BoundarySearch:
             float(boundary.positions[located.number]),
             located.point.multipliers,
         )
+
+
+def _kinds(change: MapChange, monodromy: Floats) -> list[str]:
+    """Return the kinds of boundaries that may be near the motion of a change."""
+    if change.flank >= 0:
+        return [GRAZING]
+    if not np.isfinite(monodromy).all():
+        return []
+    values = np.linalg.eigvals(monodromy)
+    leading = complex(values[np.argmax(np.abs(values))])
+    found = [FOLD] if np.any((values.imag == 0.0) & (values.real > NEAR_FOLD)) else []
+    if leading.imag:
+        found.append(NEIMARK_SACKER)
+    elif leading.real < 0.0:
+        found.append(PERIOD_DOUBLING)
+    return found
 
 
 def _alike(one: Equations, other: Equations) -> bool:

@@ -1,7 +1,7 @@
 """Where a map changes between neighbouring cells: places from which boundaries can be started."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -9,10 +9,7 @@ from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.results.reading.result import Result
 
 PARTS = 12
-"""Parts of each range; of the changes in each part of the map, one of every kind is a start."""
-
-SLOWEST = np.log(0.5)
-"""Least logarithm of the leading multiplier of a motion that may be near a loss of stability."""
+"""Parts of each range; in each part of the map, one change of every kind is a start at a time."""
 
 
 class MapChange(NamedTuple):
@@ -39,20 +36,89 @@ class MapChange(NamedTuple):
     number: int
 
 
-class _Cells(NamedTuple):
-    """A map as arrays over the second and the first parameter and the starts of each cell."""
+class Changes(NamedTuple):
+    """The changes of a map, one row each.
 
+    Attributes
+    ----------
+    flank, period, number : array of int, shape (changes,)
+        As in `MapChange`.
+    state : array, shape (changes, states)
+        As in `MapChange`.
+    cells : array of int, shape (changes, 2, 2)
+        Both cells of each change, that of the motion first; each has its numbers along the first
+        and the second parameter.
+    counts : array of int, shape (2,)
+        Number of cells along the first and the second parameter.
+    shares : array, shape (changes, 2)
+        As in `MapChange`.
+    """
+
+    flank: Integers
     period: Integers
+    number: Integers
     state: Floats
+    cells: Integers
+    counts: Integers
     shares: Floats
-    growth: Floats
-    impacts: Floats
+
+    def of(self, chosen: Mask | Integers) -> Self:
+        """Return some of the changes."""
+        return self._replace(
+            flank=self.flank[chosen],
+            period=self.period[chosen],
+            number=self.number[chosen],
+            state=self.state[chosen],
+            cells=self.cells[chosen],
+            shares=self.shares[chosen],
+        )
+
+    def beside(self, curve: Floats) -> Mask:
+        """Return which changes have a cell next to a curve through points (points, 2) in shares."""
+        marked = np.zeros(self.counts + 2, dtype=bool)
+        at = curve * (self.counts - 1)
+        for one, other in zip(at[:-1], at[1:], strict=True):
+            parts = int(2.0 * np.max(np.abs(other - one))) + 1
+            between = one + np.arange(parts + 1)[:, np.newaxis] / parts * (other - one)
+            marked[tuple(np.rint(between).astype(int).T + 1)] = True
+        near = np.zeros_like(marked)
+        for across in (-1, 0, 1):
+            for along in (-1, 0, 1):
+                near |= np.roll(marked, (across, along), axis=(0, 1))
+        first, second = self.cells[..., 0] + 1, self.cells[..., 1] + 1
+        beside: Mask = near[first, second].any(axis=1)
+        return beside
+
+    def spread(self, preferred: int) -> Integers:
+        """Return the numbers of changes that are spread over the map, one of a kind in each part.
+
+        Those at one value of parameter ``preferred`` come first, in the middle of each part: so
+        many have the same value.
+        """
+        parts = np.minimum((self.shares * PARTS).astype(int), PARTS - 1)
+        away = np.abs(self.shares * PARTS - parts - 0.5)
+        aside = away[:, max(preferred, 0)] + (self.number != preferred)
+        keys = np.column_stack([self.flank, self.period, parts])
+        order = np.argsort(aside, kind="stable")
+        _, first = np.unique(keys[order], axis=0, return_index=True)
+        return np.sort(order[first])
+
+    def each(self) -> Iterator[MapChange]:
+        """Yield the changes one by one."""
+        for at in range(self.flank.size):
+            yield MapChange(
+                int(self.flank[at]),
+                int(self.period[at]),
+                self.state[at],
+                self.shares[at],
+                int(self.number[at]),
+            )
 
 
 def changes_of(
     result: Result, axes: Sequence[str], ends: Floats, longest: int, impacts: Sequence[str]
-) -> list[MapChange]:
-    """Return changes of the periodic motions of a map, spread over the map.
+) -> Changes:
+    """Return the changes of the periodic motions of a map.
 
     Parameters
     ----------
@@ -67,18 +133,30 @@ def changes_of(
     impacts : sequence of str
         Names of the outputs with the impacts on both flanks of each element.
     """
-    cells = _cells(result, axes, ends, impacts)
-    periodic = (cells.period > 0) & (cells.period <= longest)
-    found: list[MapChange] = []
-    for number in range(2):
+    shape = tuple(result[axis].shape[0] for axis in axes[::-1])
+    period = result.lanes("period").reshape(*shape, -1).astype(np.intp)
+    counts = [result.lanes(name).reshape(period.shape) * period for name in impacts]
+    periodic = (period > 0) & (period <= longest)
+    found = []
+    for number in (0, 1):
         one, other = _neighbours(number)
-        differs = cells.period[one] != cells.period[other]
-        found += _chosen(cells, -1, number, (differs, periodic))
-        for flank in range(len(impacts)):
-            same = ~differs & periodic[one] & periodic[other]
-            more = np.abs(cells.impacts[flank][one] - cells.impacts[flank][other]) > 0.5
-            found += _chosen(cells, flank, number, (same & more, periodic))
-    return found
+        differs = period[one] != period[other]
+        found.append(_rows(-1, number, differs, periodic))
+        for flank, count in enumerate(counts):
+            more = np.abs(count[one] - count[other]) > 0.5
+            found.append(_rows(flank, number, more & ~differs, periodic))
+    rows = np.concatenate(found)
+    lanes = np.ravel_multi_index(tuple(rows[:, [3, 2, 6]].T), period.shape)
+    place = np.stack([result.along(axis) for axis in axes], axis=-1)[lanes]
+    return Changes(
+        rows[:, 0],
+        period.reshape(-1)[lanes],
+        rows[:, 1],
+        result.lanes("end_state")[lanes],
+        rows[:, 2:6].reshape(-1, 2, 2),
+        np.array(shape[::-1], dtype=np.intp),
+        (place - ends[0]) / (ends[1] - ends[0]),
+    )
 
 
 def _neighbours(number: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -87,39 +165,17 @@ def _neighbours(number: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     return ((first, whole), (last, whole)) if number == 0 else ((whole, first), (whole, last))
 
 
-def _cells(result: Result, axes: Sequence[str], ends: Floats, impacts: Sequence[str]) -> _Cells:
-    """Return the arrays of a map."""
-    shape = tuple(result[axis].shape[0] for axis in axes[::-1])
-    period = result.lanes("period").reshape(*shape, -1)
-    state = result.lanes("end_state").reshape(*period.shape, -1)
-    place = np.stack([result.along(axis) for axis in axes], axis=-1)
-    shares = ((place - ends[0]) / (ends[1] - ends[0])).reshape(*period.shape, 2)
-    growth = np.zeros(period.shape)
-    if "lyapunov_exponent" in result.variables:
-        growth = result.lanes("lyapunov_exponent").reshape(period.shape)
-    counts = [result.lanes(name).reshape(period.shape) for name in impacts]
-    return _Cells(period, state, shares, growth, np.array(counts) * period)
+def _rows(flank: int, number: int, differs: Mask, periodic: Mask) -> Integers:
+    """Return changes at one value of a parameter, from each side with a periodic motion.
 
-
-def _chosen(
-    cells: _Cells, flank: int, number: int, where: tuple[Mask, Mask]
-) -> Iterator[MapChange]:
-    """Yield one change of each part of the map, the one whose motion decays most slowly.
-
-    ``where``: whether the neighbours at one value of parameter ``number`` differ, and whether the
-    motions of all cells are periodic.
+    Each row has the flank, the parameter, both cells, and the number of the start.
     """
-    differs, periodic = where
-    best: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
-    for beyond in (False, True):
-        cell = _neighbours(number)[beyond]
-        for index in zip(*np.nonzero(differs & periodic[cell]), strict=True):
-            at = (index[0] + (beyond and number == 0), index[1] + (beyond and number == 1))
-            whole = (*map(int, at), int(index[2]))
-            growth, period = float(cells.growth[whole]), int(cells.period[whole])
-            parts = np.minimum((cells.shares[whole] * PARTS).astype(int), PARTS - 1)
-            key = (period, *parts.tolist())
-            if key not in best or growth > best[key][0]:
-                best[key] = growth, whole
-    for _, at in best.values():
-        yield MapChange(flank, int(cells.period[at]), cells.state[at], cells.shares[at], number)
+    second, first, start = np.nonzero(differs)
+    step = np.array([0, 1]) if number == 0 else np.array([1, 0])
+    begin = np.column_stack([first, second])
+    found = []
+    for one, other in ((begin, begin + step), (begin + step, begin)):
+        kept = periodic[one[:, 1], one[:, 0], start]
+        about = np.broadcast_to(np.array([flank, number]), (len(start), 2))
+        found.append(np.column_stack([about, one, other, start])[kept])
+    return np.concatenate(found)
