@@ -31,6 +31,9 @@ STATE_DIFFERENCE = 1e-7
 STEPS, CONTRACTION = 12, 0.1
 """Most Newton steps, and the ratio of two lengths above which derivatives are computed anew."""
 
+STRAIGHT = 1e-5
+"""Length of a Newton step after which derivatives have hardly changed."""
+
 SHORT = 1e-10
 """Length of a Newton step below which a point is accepted."""
 
@@ -187,7 +190,10 @@ class Equations(NamedTuple):
                 return self._point(place, slopes, direction, passed, reference)
             if not length < 0.9 * last:
                 return None
-            slopes = slopes if length < CONTRACTION * last or length < SHORT else None
+            # With the parameter of the flow maps fixed, derivatives take no further maps.
+            moves = self.fixed < 0 or direction[self.fixed - PARAMETERS] ** 2 != 1.0
+            near = length < (CONTRACTION * last if moves else STRAIGHT)
+            slopes = slopes if near or length < SHORT else None
             place, last = place + step, length
             if np.linalg.norm(place - guess) > 1.0:
                 return None

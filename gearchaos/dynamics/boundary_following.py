@@ -23,7 +23,7 @@ from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST,
 FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-5
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
-SMOOTH, TURN = 0.9, 0.3
+SMOOTH, TURN = 0.8, 0.45
 """Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
 
 ASIDE = 0.3
@@ -106,10 +106,10 @@ def _turned(point: OnBoundary) -> OnBoundary:
 
 def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Following[None]:
     """Follow a half up to its end, or until it meets another one."""
-    points, step, bend = half.points, FIRST_STEP, np.zeros_like(half.points[0].place)
+    points, step = half.points, FIRST_STEP
     while not half.end and half.met is None:
         here = points[-1]
-        trial, leaves = yield from _next(equations, here, step, bend)
+        trial, leaves = yield from _next(equations, points, step)
         if half.met is not None:
             return
         if trial is None or trial.tangent @ here.tangent < SMOOTH:
@@ -127,7 +127,6 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
         length = float(np.linalg.norm(trial.place - here.place))
         points += [trial] if length > 0.0 else []
         half.end = EDGE if leaves else _end_at(points)
-        bend = (trial.tangent - here.tangent) / length if length > 0.0 else 0.0 * bend
         turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
         step = min(length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0), LONGEST)
 
@@ -174,10 +173,11 @@ def _why_lost(equations: Equations, here: OnBoundary) -> str:
 
 
 def _next(
-    equations: Equations, here: OnBoundary, step: float, bend: Floats
+    equations: Equations, points: list[OnBoundary], step: float
 ) -> Following[tuple[OnBoundary | None, bool]]:
     """Search the next point of a boundary, or None, and whether it lies at an edge."""
-    ahead = here.place + step * here.tangent + 0.5 * step**2 * bend
+    here = points[-1]
+    ahead = _ahead(points[-2:], step)
     guess, direction = among_columns(equations, ahead, here.tangent, 0.5 * step)
     outside = (guess < 0.0) | (guess > 1.0)
     outside[:-PARAMETERS] = False
@@ -191,6 +191,23 @@ def _next(
         outside[:-PARAMETERS] = False
         guess = trial.place
     return (yield from _at_edge(equations, here, guess, step, outside)), True
+
+
+def _ahead(last: Sequence[OnBoundary], step: float) -> Floats:
+    """Return the place a step beyond the last points of a boundary (states + 2,).
+
+    The cubic through two points and their tangents is extended; one point has its tangent only.
+    """
+    *before, here = last
+    ahead = here.place + step * here.tangent
+    if not before:
+        return ahead
+    chord = here.place - before[0].place
+    length = np.linalg.norm(chord)
+    slope, old = chord / length, before[0].tangent
+    square = (2.0 * here.tangent + old - 3.0 * slope) / length
+    cube = (here.tangent + old - 2.0 * slope) / length**2
+    return np.asarray(ahead + step**2 * square + step**3 * cube)
 
 
 def fixed_direction(equations: Equations, tangent: Floats) -> Floats:

@@ -1,6 +1,7 @@
 """Where a map changes between neighbouring cells: places from which boundaries can be started."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -45,6 +46,8 @@ class Changes(NamedTuple):
         As in `MapChange`.
     state : array, shape (changes, states)
         As in `MapChange`.
+    growth : array, shape (changes,)
+        Largest exponent of the motion, 0 if the map has none.
     cells : array of int, shape (changes, 2, 2)
         Both cells of each change, that of the motion first; each has its numbers along the first
         and the second parameter.
@@ -58,6 +61,7 @@ class Changes(NamedTuple):
     period: Integers
     number: Integers
     state: Floats
+    growth: Floats
     cells: Integers
     counts: Integers
     shares: Floats
@@ -69,6 +73,7 @@ class Changes(NamedTuple):
             period=self.period[chosen],
             number=self.number[chosen],
             state=self.state[chosen],
+            growth=self.growth[chosen],
             cells=self.cells[chosen],
             shares=self.shares[chosen],
         )
@@ -77,7 +82,7 @@ class Changes(NamedTuple):
         """Return which changes have a cell next to a curve through points (points, 2) in shares."""
         marked = np.zeros(self.counts + 2, dtype=bool)
         at = curve * (self.counts - 1)
-        for one, other in zip(at[:-1], at[1:], strict=True):
+        for one, other in pairwise(at):
             parts = int(2.0 * np.max(np.abs(other - one))) + 1
             between = one + np.arange(parts + 1)[:, np.newaxis] / parts * (other - one)
             marked[tuple(np.rint(between).astype(int).T + 1)] = True
@@ -92,14 +97,15 @@ class Changes(NamedTuple):
     def spread(self, preferred: int) -> Integers:
         """Return the numbers of changes that are spread over the map, one of a kind in each part.
 
-        Those at one value of parameter ``preferred`` come first, in the middle of each part: so
+        A motion that decays slowly is near a loss of stability. Of motions that meet another flank,
+        those at one value of parameter ``preferred`` come first, in the middle of each part: so
         many have the same value.
         """
         parts = np.minimum((self.shares * PARTS).astype(int), PARTS - 1)
         away = np.abs(self.shares * PARTS - parts - 0.5)
         aside = away[:, max(preferred, 0)] + (self.number != preferred)
         keys = np.column_stack([self.flank, self.period, parts])
-        order = np.argsort(aside, kind="stable")
+        order = np.lexsort([aside, np.where(self.flank < 0, -self.growth, 0.0)])
         _, first = np.unique(keys[order], axis=0, return_index=True)
         return np.sort(order[first])
 
@@ -145,7 +151,9 @@ def changes_of(
         for flank, count in enumerate(counts):
             more = np.abs(count[one] - count[other]) > 0.5
             found.append(_rows(flank, number, more & ~differs, periodic))
-    rows = np.concatenate(found)
+    rows, growth = np.concatenate(found), np.zeros(period.size)
+    if "lyapunov_exponent" in result.variables:
+        growth = result.lanes("lyapunov_exponent")
     lanes = np.ravel_multi_index(tuple(rows[:, [3, 2, 6]].T), period.shape)
     place = np.stack([result.along(axis) for axis in axes], axis=-1)[lanes]
     return Changes(
@@ -153,6 +161,7 @@ def changes_of(
         period.reshape(-1)[lanes],
         rows[:, 1],
         result.lanes("end_state")[lanes],
+        growth[lanes],
         rows[:, 2:6].reshape(-1, 2, 2),
         np.array(shape[::-1], dtype=np.intp),
         (place - ends[0]) / (ends[1] - ends[0]),
