@@ -13,7 +13,7 @@ from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import CurvePoint
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
 from gearchaos.dynamics.boundary_following import (
-    FIRST_STEP,
+    SHORT_STEP,
     Path,
     among_columns,
     cubic,
@@ -229,7 +229,7 @@ def _points_between(
     length = float(np.linalg.norm(chord))
     middle = cubic(one, other, np.array([0.5]))[0]
     aside = np.linalg.norm((middle - (one.place + other.place) / 2.0)[-PARAMETERS:])
-    if not (aside > FLAT and length > FIRST_STEP):
+    if not (aside > FLAT and length > SHORT_STEP):
         return []
     guess, direction = among_columns(equations, middle, chord / length, 0.2 * length)
     between = yield from equations.correcting(guess, direction, one.reference)

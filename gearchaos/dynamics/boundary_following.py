@@ -20,7 +20,7 @@ from gearchaos.records.boundary import (
 )
 from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST, TOO_MANY
 
-FIRST_STEP, LONGEST, SHORTEST = 5e-3, 0.25, 1e-5
+START_STEP, SHORT_STEP, LONGEST, SHORTEST = 0.04, 5e-3, 0.25, 1e-5
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
 SMOOTH, TURN = 0.8, 0.45
@@ -106,7 +106,7 @@ def _turned(point: OnBoundary) -> OnBoundary:
 
 def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Following[None]:
     """Follow a half up to its end, or until it meets another one."""
-    points, step = half.points, FIRST_STEP
+    points, step = half.points, START_STEP
     while not half.end and half.met is None:
         here = points[-1]
         trial, leaves = yield from _next(equations, points, step)

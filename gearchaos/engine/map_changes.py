@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.results.reading.result import Result
 
-PARTS = 12
+PARTS = 8
 """Parts of each range; in each part of the map, one change of every kind is a start at a time."""
 
 
