@@ -55,6 +55,9 @@ TESTS = {
 FLAT = 1e-3
 """Largest distance of a boundary from the line between two points, in shares of both ranges."""
 
+JUMP = 0.1
+"""Share of the values at both ends that a test may have where it changes its sign."""
+
 SETTLED = 2e-10
 """Distance of two successive trials below which the next one would change less than `LOCATED`."""
 
@@ -338,28 +341,46 @@ def _has_complex_pair(multipliers: Complex) -> bool:
 def _located(
     equations: Equations, one: OnBoundary, other: OnBoundary, name: str
 ) -> Following[OnBoundary | None]:
-    """Search the point between two points at which a test changes its sign (Illinois method)."""
-    begin: OnBoundary = one
+    """Search the point between two points at which a test changes its sign (Chandrupatla 1997)."""
+    chord = other.place - one.place
+    length = float(np.linalg.norm(chord))
+    direction = fixed_direction(equations, chord / length)
     nearest: OnBoundary | None = None
-    low, high = (_tests(equations.kind, at, begin)[name] for at in (one, other))
-    for number in range(MOST_TRIALS):
-        chord = other.place - one.place
-        length = float(np.linalg.norm(chord))
-        if length <= LOCATED:
-            break
-        share = 0.5 if number % 4 == 3 else low / (low - high)
-        share = min(max(share, 1e-3), 1.0 - 1e-3)
-        direction = fixed_direction(equations, chord / length)
-        guess = one.place + share * chord
-        middle = yield from equations.correcting(guess, direction, one.reference)
+    low, high = (_tests(equations.kind, at, one)[name] for at in (one, other))
+    newest, opposite, share = (1.0, high), (0.0, low), low / (low - high)
+    for _ in range(MOST_TRIALS):
+        least = min(0.1, LOCATED / length)
+        guess = cubic(one, other, np.array([min(max(share, least), 1.0 - least)]))[0]
+        middle = yield from equations.correcting(guess, direction, one.reference, LOCATED)
         if middle is None:
             break
-        settled = nearest is not None and np.linalg.norm(middle.place - nearest.place) <= SETTLED
-        nearest, value = middle, _tests(equations.kind, middle, begin)[name]
-        if value == 0.0 or settled:
-            break
-        if (value > 0.0) == (low > 0.0):
-            one, low, high = middle, value, high / 2.0
+        moved = np.inf if nearest is None else np.linalg.norm(middle.place - nearest.place)
+        nearest, value = middle, _tests(equations.kind, middle, one)[name]
+        before = newest
+        if (value > 0.0) == (newest[1] > 0.0):
+            newest = share, value
         else:
-            other, high, low = middle, value, low / 2.0
-    return nearest
+            before, newest, opposite = opposite, (share, value), newest
+        width = abs(newest[0] - opposite[0]) * length
+        if value == 0.0 or moved <= SETTLED or width <= LOCATED:
+            break
+        share = _between(newest, opposite, before)
+    # Where the test jumps, such as at a grazing, it is not zero.
+    return nearest if abs(newest[1]) <= JUMP * max(abs(low), abs(high)) else None
+
+
+def _between(
+    newest: tuple[float, float], opposite: tuple[float, float], before: tuple[float, float]
+) -> float:
+    """Return where a function may be zero between two of three places, each with its value.
+
+    Inverse quadratic interpolation where it is safe, else the middle.
+    """
+    (a, at_a), (b, at_b), (c, at_c) = newest, opposite, before
+    part = 0.5
+    if c not in (a, b) and at_a != at_c and at_b != at_c:
+        along, ratio = (a - b) / (c - b), (at_a - at_b) / (at_c - at_b)
+        if ratio**2 < along and (1.0 - ratio) ** 2 < 1.0 - along:
+            part = at_a / (at_b - at_a) * at_c / (at_b - at_c)
+            part += (c - a) / (b - a) * at_a / (at_c - at_a) * at_b / (at_c - at_b)
+    return a + min(max(part, 0.0), 1.0) * (b - a)

@@ -158,11 +158,17 @@ class Equations(NamedTuple):
         return run(self.correcting(guess, direction, reference), passed_of)
 
     def correcting(
-        self, guess: Floats, direction: Floats, reference: Reference
+        self, guess: Floats, direction: Floats, reference: Reference, nearly: float = NEARLY
     ) -> Following[OnBoundary | None]:
-        """Return the search of `corrected`."""
+        """Return the search of `corrected`.
+
+        ``nearly``: length of a step after which a point may be accepted without another orbit; its
+        multipliers are those before the step.
+        """
         place, last, where = guess, np.inf, guess
         slopes: Floats | None = None
+        # With the parameter of the flow maps fixed, derivatives take no further maps.
+        moves = self.fixed < 0 or direction[self.fixed - PARAMETERS] ** 2 != 1.0
         for _ in range(STEPS):
             if slopes is None:
                 passed, value, slopes = yield from self._differentiated(place, reference)
@@ -182,7 +188,7 @@ class Equations(NamedTuple):
             closed = max(CLOSED, ROUNDING * float(np.max(np.abs(passed.monodromy[0]))))
             # In the second case the next step would be shorter than SHORT.
             if (length <= SHORT and float(np.max(np.abs(defect[:-1]))) <= closed) or (
-                length <= NEARLY and length**2 <= SHORT * last
+                length <= nearly and length**2 <= SHORT * last
             ):
                 place = place + step
                 if np.linalg.norm(place - where) > NEAR_ENOUGH:
@@ -190,8 +196,6 @@ class Equations(NamedTuple):
                 return self._point(place, slopes, direction, passed, reference)
             if not length < 0.9 * last:
                 return None
-            # With the parameter of the flow maps fixed, derivatives take no further maps.
-            moves = self.fixed < 0 or direction[self.fixed - PARAMETERS] ** 2 != 1.0
             near = length < (CONTRACTION * last if moves else STRAIGHT)
             slopes = slopes if near or length < SHORT else None
             place, last = place + step, length

@@ -23,7 +23,7 @@ from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST,
 START_STEP, SHORT_STEP, LONGEST, SHORTEST = 0.04, 5e-3, 0.25, 1e-5
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
-SMOOTH, TURN = 0.8, 0.45
+SMOOTH, TURN = 0.9, 0.3
 """Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
 
 ASIDE = 0.3
