@@ -353,6 +353,9 @@ def _located(
         guess = cubic(one, other, np.array([min(max(share, least), 1.0 - least)]))[0]
         middle = yield from equations.correcting(guess, direction, one.reference, LOCATED)
         if middle is None:
+            # Next to a double multiplier rounding leaves longer steps.
+            middle = yield from equations.correcting(guess, direction, one.reference)
+        if middle is None:
             break
         moved = np.inf if nearest is None else np.linalg.norm(middle.place - nearest.place)
         nearest, value = middle, _tests(equations.kind, middle, one)[name]

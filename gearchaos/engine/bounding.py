@@ -325,25 +325,29 @@ class _BoundarySearch:
 
     def _follow(self, searches: list[Following["_Begun"]]) -> None:
         """Follow the boundaries through points that lie on none that is known."""
-        new: list[tuple[Equations, list[OnBoundary]]] = []
         begun = run(together(searches), passed_of)
         held = run(together([self._held(one) for one in begun]), passed_of)
+        new: list[_Begun] = []
         for one, is_held in zip(begun, held, strict=True):
             if one.start is None and one.special is not None:
                 self.found.append(unstarted(one.equations, one.guess, one.special))
-            if one.start is None or is_held or not one.within:
-                continue
-            same = [starts for equations, starts in new if _alike(equations, one.equations)]
-            if same:
-                same[0].append(one.start)
-            else:
-                new.append((one.equations, [one.start]))
+            if one.start is not None and not is_held and one.within:
+                new.append(one)
         before = len(self.found)
-        self._trace(new)
-        self._trace(self._turning(self.found[before:]))
+        turning = [one for one in new if one.equations.kind == NEIMARK_SACKER]
+        self._trace([one for one in new if one.equations.kind != NEIMARK_SACKER])
+        # Curves of pairs end at resonances, where several multipliers may meet: they start there.
+        self._trace([*self._turning(self.found[before:]), *turning])
 
-    def _trace(self, starts: list[tuple[Equations, list[OnBoundary]]]) -> None:
+    def _trace(self, begun: list["_Begun"]) -> None:
         """Follow the boundaries through some points of each kind side by side."""
+        starts: list[tuple[Equations, list[OnBoundary]]] = []
+        for one in begun:
+            same = [some for equations, some in starts if _alike(equations, one.equations)]
+            if one.start is not None and same:
+                same[0].append(one.start)
+            elif one.start is not None:
+                starts.append((one.equations, [one.start]))
         traced = run(together([tracing(*one) for one in starts]), passed_of)
         for boundary in (one for some in traced for one in some):
             # Orbits of longer periods are the same at each of their section points.
@@ -359,11 +363,9 @@ class _BoundarySearch:
                 return True
         return False
 
-    def _turning(
-        self, boundaries: list[TracedBoundary]
-    ) -> list[tuple[Equations, list[OnBoundary]]]:
+    def _turning(self, boundaries: list[TracedBoundary]) -> list["_Begun"]:
         """Return points of curves of pairs with the product 1, at resonances on boundaries."""
-        found: list[tuple[Equations, list[OnBoundary]]] = []
+        found = []
         for boundary in boundaries:
             if boundary.equations.kind == NEIMARK_SACKER:
                 continue
@@ -372,9 +374,9 @@ class _BoundarySearch:
                 if located.kind not in RESONANCES:
                     continue
                 point, pair = located.point, Reference(cosine=RESONANCES[located.kind])
-                begun = turning.corrected(point.place, point.tangent, pair)
-                if begun is not None and not self._passes(turning, begun):
-                    found.append((turning, [begun]))
+                begun = _Begun(turning, turning.corrected(point.place, point.tangent, pair))
+                if begun.start is not None and not self._passes(turning, begun.start):
+                    found.append(begun)
         return found
 
     def _passes(self, equations: Equations, start: OnBoundary) -> bool:
