@@ -6,7 +6,7 @@ flow.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate
@@ -335,7 +335,7 @@ class Equations(NamedTuple):
         return self._replace(kind=GRAZING, flank=flank, plan=plan)
 
 
-def _pairs(multipliers: Complex, cosine: float | None) -> Complex:
+def _pairs(multipliers: Any, cosine: float | None) -> Complex:
     """Return the pairs of multipliers, complex or real, with products nearest to 1, (places, 2).
 
     ``multipliers``: shape (places, states); ``cosine``: their mean at a neighbouring point; None

@@ -154,11 +154,12 @@ def _met(here: OnBoundary, trial: OnBoundary, half: _Half, halves: list[_Half]) 
     (near,) = np.nonzero(
         facing & (along > 0.0) & (along <= 1.0) & (aside <= ASIDE * np.sqrt(square))
     )
-    for at in near[np.argsort(along[near], kind="stable")]:
-        target = others[at].points[-1].place
+    for at in near[np.argsort(along[near], kind="stable")].tolist():
+        ahead: _Half = others[at]
+        target = ahead.points[-1].place
         curve = cubic(here, trial, np.linspace(0.0, 1.0, 101))
         if np.min(np.linalg.norm(curve - target, axis=1)) < SAME_CURVE + 0.02 * np.sqrt(square):
-            return others[at]
+            return ahead
     return None
 
 

@@ -358,8 +358,9 @@ class _BoundarySearch:
     def _held(self, begun: "_Begun") -> Following[bool]:
         """Search whether a point lies on a boundary that is known."""
         for one in self.found:
-            same = begun.start is not None and _alike(one.equations, begun.equations)
-            if same and (yield from one.holding(begun.start)):
+            if begun.start is None or not _alike(one.equations, begun.equations):
+                continue
+            if (yield from one.holding(begun.start)):
                 return True
         return False
 

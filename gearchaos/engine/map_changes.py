@@ -91,8 +91,7 @@ class Changes(NamedTuple):
             for along in (-1, 0, 1):
                 near |= np.roll(marked, (across, along), axis=(0, 1))
         first, second = self.cells[..., 0] + 1, self.cells[..., 1] + 1
-        beside: Mask = near[first, second].any(axis=1)
-        return beside
+        return np.asarray(near[first, second].any(axis=1))
 
     def spread(self, preferred: int) -> Integers:
         """Return the numbers of changes that are spread over the map, one of a kind in each part.

@@ -9,17 +9,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gearchaos_kernels import Plan
 
 import gearchaos
+from gearchaos.dynamics.boundary_equations import Equations
+from gearchaos.dynamics.boundary_following import following
+from gearchaos.dynamics.boundary_passages import passed_of
+from gearchaos.dynamics.side_by_side import run
 from gearchaos.engine.bounding import find_boundaries
+from gearchaos.engine.running import one_thread
+from gearchaos.models.registry import system_of
 from gearchaos.records.boundary import RESONANCES, STRONG_RESONANCE_12, WEAKER_RESONANCES
-from gearchaos.records.branch import NEIMARK_SACKER, PERIOD_DOUBLING
+from gearchaos.records.branch import EDGE, NEIMARK_SACKER, PERIOD_DOUBLING
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
 (LOST,) = EXACT["two_masses"]["neimark_sacker"]
 STOP = 100.0
 """Stiffness of the stop of the exact points."""
+
+LIMITS = np.array([[0.6, 5.0], [0.635, STOP]])
+"""Lowest and highest frequency and stiffness of the stop."""
 
 QUICK = ["integration.method='flow_map'", "integration.recorded_periods=40"]
 QUICK += ["outputs.section_points=4", "integration.transient_periods=300"]
@@ -136,3 +146,29 @@ def test_a_pair_near_1_2_stays_on_the_unit_circle():
     assert np.abs(pairs) == pytest.approx(1.0, abs=1e-8)
     assert (pairs.real < -0.9).any()
     assert (pairs.imag != 0.0).all()
+
+
+def test_starts_on_one_curve_become_parts_of_it():
+    curve, (low, high) = curve_of_masses(), LIMITS
+    plan = Plan(24, 0, 1, 1, tangent=True, method="flow_map")
+    scale = np.abs(curve.section[:, -1]).max(axis=0)
+
+    def system_at(shares):
+        values = (low + shares * (high - low)).T
+        named = dict(zip(("frequency", "clearance.stop.stiffness"), values, strict=True))
+        return system_of(masses(), named, masses().needed_effects)
+
+    equations = Equations(system_at, plan, 1, scale, NEIMARK_SACKER)
+    starts = []
+    for at in (3, 8, curve.arclength.size - 4):
+        shares = (curve.values[at] - low) / (high - low)
+        guess = np.concatenate([curve.section[at, -1] / scale, shares])
+        starts.append(equations.begun(guess, np.eye(guess.size)[-2]))
+    with one_thread():
+        (path,) = run(following(equations, starts), passed_of)
+    places = np.array([one.place for one in path.points])
+    steps = np.diff(places, axis=0)
+    assert (np.sum(steps[1:] * steps[:-1], axis=1) > 0.0).all()
+    for start in starts:
+        assert np.abs(places - start.place).max(axis=1).min() < 1e-9
+    assert path.ends == (EDGE, EDGE)
