@@ -1,8 +1,8 @@
 """Follow folds, period doublings and grazing of periodic orbits over two parameters.
 
-Branches of periodic orbits are traced along some lines across the map. Their special points are
-continued as curves over both parameters: folds, period doublings, Neimark-Sacker points, and
-grazing of each flank. Points of codimension 2 are located on them: cusps, resonances 1:1 to 1:4,
+Curves are started where the motion of the map changes between neighbouring lanes, and from special
+points of branches of periodic orbits along some lines across the map. They are folds, period
+doublings, Neimark-Sacker points, and grazing of each flank. Points of codimension 2 are located on them: cusps, resonances 1:1 to 1:4,
 fold-flip points, and points where a grazing meets another boundary.
 
 INPUT is the result of a sweep of two parameters with labels, or a configuration. For a
@@ -57,8 +57,8 @@ class BoundariesOptions(NamedTuple):
     lines: Annotated[
         int,
         Option(
-            "lines across the map from which curves are started; more lines find smaller closed "
-            "curves (default: %(default)s)",
+            "lines across the map from which curves are started besides the changes of the map; "
+            "more lines find smaller closed curves (default: %(default)s)",
             "N",
             low=1,
             high=1000,
@@ -135,7 +135,7 @@ def table(found: "BoundarySet") -> list[str]:
                 f"{name} = {value:.10g}" for name, value in zip(names, point.values, strict=True)
             )
             lines.append(f"  {point.kind:35} {place}")
-    return lines or ["no special point of a periodic orbit on these lines; give more with --lines"]
+    return lines or ["no boundary starts from the map or on these lines; give more with --lines"]
 
 
 main = Command("boundaries", __doc__, BoundariesOptions, _boundaries).start(__name__)

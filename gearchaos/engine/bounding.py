@@ -79,7 +79,7 @@ def find_boundaries(
         Longest period, in excitation periods.
     lines : int
         Number of lines across the map in each direction. Branches are traced along each, and the
-        special points of these are the starts of boundaries.
+        special points of these are starts of boundaries, besides the changes of the map.
     keep : callable, optional
         Called with the boundaries found so far if the search is interrupted.
 
