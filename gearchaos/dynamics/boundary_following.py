@@ -53,7 +53,7 @@ class Path(NamedTuple):
 
 
 class _Half:
-    """What is known of a boundary on one side of a start.
+    """The points of a boundary on one side of a start.
 
     ``other``: the half on the other side; ``met``: the half that it has met; ``end``: why it ends.
     """
@@ -132,7 +132,7 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
 
 
 def _end_at(points: list[OnBoundary]) -> str:
-    """Return why a half ends at its last point, empty if it goes on."""
+    """Return why a half ends at its last point, empty if it continues."""
     if len(points) > 2 and all(abs(one.reference.cosine) > 1.0 + 1e-9 for one in points[-2:]):
         # The curve continues as one of neutral saddles, which is no boundary.
         onward = points[-1].reference.cosine > 0.0

@@ -19,7 +19,7 @@ class MapChange(NamedTuple):
     Attributes
     ----------
     flank : int
-        Number of the flank of which the impacts change; -1 if the period does.
+        Number of the flank whose impacts change, -1 if the period changes.
     period : int
         Its period in excitation periods.
     state : array, shape (states,)
@@ -96,9 +96,8 @@ class Changes(NamedTuple):
     def spread(self, preferred: int) -> Integers:
         """Return the numbers of changes that are spread over the map, one of a kind in each part.
 
-        A motion that decays slowly is near a loss of stability. Of motions that meet another flank,
-        those at one value of parameter ``preferred`` come first, in the middle of each part: so
-        many have the same value.
+        A motion that decays slowly is near a loss of stability. Of other changes, those in the
+        middle of each part come first that have one value of parameter ``preferred`` in common.
         """
         parts = np.minimum((self.shares * PARTS).astype(int), PARTS - 1)
         away = np.abs(self.shares * PARTS - parts - 0.5)
