@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.errors import FigureError
+from gearchaos.explorer.starts import start_grid
 from gearchaos.figures.boundaries import boundary_overlay
 from gearchaos.figures.branches import branch_overlay, checked_variable
 from gearchaos.figures.lanes import map_axes, swept_axes
@@ -92,14 +93,16 @@ class Overlaid(NamedTuple):
 
 
 def read_overlaid(
-    result: Result, source: str, given: Sequence[str | None], units: str | None, grid: bool
+    result: Result, source: str, given: Sequence[str | None], units: str | None
 ) -> Overlaid | None:
     """Read the file of ``--branches`` or ``--boundaries``, the two that may be given.
 
-    ``source``: file of the result; ``grid``: whether it has a grid of starts. Raises FigureError
-    if they do not belong together.
+    ``source``: file of the result. Raises FigureError if they do not belong together.
     """
     branches, boundaries = given
+    if not (branches or boundaries):
+        return None
+    grid = start_grid(result, source) is not None
     swept = swept_axes(result)
     if branches and (grid or len(swept) > 1):
         page = "a grid of starts" if grid else of_map(swept[0])
@@ -109,9 +112,8 @@ def read_overlaid(
     if branches:
         found = branches_over(branches, [result], source, units=units)
         return Overlaid("branches", branches, found)
-    if boundaries:
-        return Overlaid("boundaries", boundaries, boundaries_over(boundaries, result, units))
-    return None
+    assert boundaries
+    return Overlaid("boundaries", boundaries, boundaries_over(boundaries, result, units))
 
 
 def glyphs(over: Overlay, most: int | None = None) -> list[GlyphRenderer]:
@@ -181,7 +183,8 @@ def hover(drawn: Iterable[GlyphRenderer]) -> HoverTool:
 
 def legend(over: Overlay) -> str:
     """Return the legend as HTML."""
-    looks = {one.kind: one.look for one in (*over.points, *over.lines)}
+    looks = {one.kind: one.look for one in over.points}
+    looks |= {one.kind: one.look for one in over.lines}
     return " &emsp;".join(f"{_sign(looks[kind])} {escape(kind)}" for kind in over.kinds)
 
 

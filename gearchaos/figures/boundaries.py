@@ -92,7 +92,7 @@ def draw_boundaries(
         line.set_path_effects([withStroke(**_HALO)])
         names.setdefault(one.kind, line).set_label(one.kind)
     for point in over.points:
-        look = {"ms": 3.2, "mew": 0.7, "mfc": "white", "ls": "none", "zorder": 4.0}
+        look: dict[str, Any] = {"ms": 3.2, "mew": 0.7, "mfc": "white", "ls": "none", "zorder": 4.0}
         (mark,) = axes.plot([point.x], point.y, **look, **point.look)
         mark.set_path_effects([Stroke(**_HALO), withStroke(linewidth=0.0)])
         names.setdefault(point.kind, mark).set_label(point.kind)

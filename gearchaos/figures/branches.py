@@ -114,7 +114,7 @@ def branch_overlay(found: BranchSet, name: str, between: Between = (None, None))
             kind, look = (STABLE_ORBITS, STABLE) if stable else (UNSTABLE_ORBITS, UNSTABLE)
             lines.append(OverlaidLine(kind, branch.value[piece], rows[piece], look))
         points += _special_points(found, branch, name, between)
-    there = {one.kind for one in (*lines, *points)}
+    there = {one.kind for one in lines} | {one.kind for one in points}
     order = [STABLE_ORBITS, UNSTABLE_ORBITS, *MARKERS]
     return Overlay(lines, points, [kind for kind in order if kind in there])
 
