@@ -29,7 +29,7 @@ from gearchaos.results.reading.result import Result
 PIXELS = 2.0
 """Pixels of a line for each point of its width in print; a screen is farther away than paper."""
 
-MARKER_PIXELS = 8.0
+MARKER_PIXELS = 6.0
 
 BOKEH_MARKERS = {
     "o": "circle",
@@ -169,7 +169,7 @@ def _markers(over: Overlay) -> list[GlyphRenderer]:
         }
         look = points[0].look
         shape = {"marker": BOKEH_MARKERS[look["marker"]], "size": MARKER_PIXELS}
-        shape |= {"line_color": to_hex(look["color"]), "line_width": 1.5, "fill_color": "white"}
+        shape |= {"line_color": to_hex(look["color"]), "line_width": 1.2, "fill_color": "white"}
         glyph = Scatter(x="x", y="y", **shape)
         drawn.append(GlyphRenderer(data_source=ColumnDataSource(data), glyph=glyph))
     return drawn

@@ -26,10 +26,10 @@ from gearchaos.explorer.overlay import Overlaid, glyphs, hover, legend
 from gearchaos.explorer.shades import basin_boxes, stage_boxes
 from gearchaos.explorer.starts import AT_START, ATTRACTOR, start_grid
 from gearchaos.explorer.text import plain_text
-from gearchaos.figures.branches import limits_with
 from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import axis_label, in_words, unit_of
 from gearchaos.figures.lanes import cell_edges, diagram_lanes, swept_axes
+from gearchaos.figures.overlay import Overlay
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import forces_of
 from gearchaos.figures.style import GREY, VERMILION
@@ -286,7 +286,6 @@ class ExplorerPage:
         self._last = self._value("variable"), chosen.fixed, self._value("units")
         line = Span(dimension="height", line_color=GREY)
         zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
-        self._overlay.draw(charts[0], self._shown, self._value("variable"), self._value("units"))
         if ends := self._ends:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
@@ -299,6 +298,8 @@ class ExplorerPage:
             if chart is charts[0]:
                 hooks.append(self._overlay.hook)
             chart.opts(tools=[CrosshairTool(overlay=line)], hooks=hooks)
+            # The first tool for drags is the active one of the toolbar that all charts share.
+            chart.opts(default_tools=["box_zoom", "wheel_zoom", "pan", "save", "reset"])
             chart.opts(active_tools=["box_zoom", "wheel_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
@@ -313,13 +314,14 @@ class ExplorerPage:
     def _drawn(self, place: Mapping[str, float]) -> tuple[Charts, list[Any]]:
         """Draw the charts of the sweep at a place on its other axes, with what lies over them."""
         variable, shown = self._value("variable"), self._shown
+        over = self._overlay.drawn(shown, variable, self._value("units"))
         if self._grid and self._grid.has_basins:
             self._basins = self._grid.basins(place, self._value("units"))
             if variable == ATTRACTOR:
                 return basin_map(shown, self._basins)
         if len(self._swept) > 1:
             return two_parameter_map(shown, variable), []
-        charts, _ = diagram(shown, variable)
+        charts, _ = diagram(shown, variable, over)
         boxes, kinds = stage_boxes(shown, diagram_lanes(shown).limits)
         if self._basins:
             boxes, kinds = basin_boxes(self._basins)
@@ -512,11 +514,11 @@ class _PageOverlay:
         shown = self.overlaid is not None and self._drawn and self.switch.value
         return [f"--{self.name}", self.overlaid.path] if self.overlaid and shown else []
 
-    def draw(self, chart: Any, result: Result, variable: str, units: str) -> None:
-        """Make the lines and markers for a chart, and extend its limits to hold them."""
-        self._drawn = []
+    def drawn(self, result: Result, variable: str, units: str) -> Overlay | None:
+        """Make the lines and markers for a chart, and return what they show."""
+        self._drawn, over = [], None
         if self.overlaid is None:
-            return
+            return None
         try:
             if units == "physical":
                 raise FigureError(f"{self.name} are drawn in dimensionless units only")
@@ -525,10 +527,8 @@ class _PageOverlay:
             self._text = escape(str(error))
         else:
             self._drawn, self._text = glyphs(over), legend(over)
-            if len(swept_axes(result)) == 1:
-                given = chart.opts.get("plot").kwargs
-                chart.opts(ylim=limits_with(over, given["ylim"], given["xlim"]))
         self._show()
+        return over
 
     def hook(self, plot: Any, _element: Any) -> None:
         """Put lines and markers into the chart when it is first drawn."""

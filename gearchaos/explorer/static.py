@@ -83,8 +83,8 @@ def _page(result: Result, numbers: int, found: Basins | None, overlaid: Overlaid
     names = [name for name, _ in entries]
     charts, ranges, switched = {}, list[Any](), list[Any]()
     for name in names:
-        # Half of all numbers are those of the basins, or of what is drawn over the charts.
-        most = max(1, numbers // (2 * len(names) if found or overlaid else len(names)))
+        # Half of all numbers are those of the basins.
+        most = max(1, numbers // (2 * len(names) if found else len(names)))
         most = numbers // 2 if name == ATTRACTOR else most
         if of_map:
             panel, kinds = _map(result, name, most, found if name == ATTRACTOR else None)
