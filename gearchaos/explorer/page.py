@@ -298,8 +298,6 @@ class ExplorerPage:
             if chart is charts[0]:
                 hooks.append(self._overlay.hook)
             chart.opts(tools=[CrosshairTool(overlay=line)], hooks=hooks)
-            # The first tool for drags is the active one of the toolbar that all charts share.
-            chart.opts(default_tools=["box_zoom", "wheel_zoom", "pan", "save", "reset"])
             chart.opts(active_tools=["box_zoom", "wheel_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
