@@ -43,7 +43,6 @@ BOKEH_MARKERS = {
     "<": "hex",
     "X": "square_x",
     "P": "plus",
-    ".": "dot",
 }
 """Names in Bokeh of the markers of matplotlib; one that Bokeh lacks has another shape."""
 
