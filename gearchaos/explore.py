@@ -3,6 +3,9 @@
 Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
 address in the browser is a link to the current view.
 
+--branches and --boundaries draw what `plot` draws with them, and a switch shows or hides it. The
+pointer at a special point shows what happens there.
+
 --save writes an interactive page instead: diagram with stages and exponents, map, or basins, of at
 most 5 MB, for readers without the program. It has no motions of lanes.
 
