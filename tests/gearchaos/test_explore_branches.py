@@ -137,7 +137,7 @@ def test_a_saved_page_draws_branches_and_its_switch_hides_them(folder):
         assert all(one[0] for one in dashed_and_solid(page))
         # Of a variable that the orbits do not have, the page says so.
         page.locator("select").select_option(index=1)
-        page.get_by_text("of the branches").wait_for()
+        page.locator("text=of the branches >> visible=true").wait_for()
         browser.close()
     assert wrong == []
 
