@@ -65,7 +65,7 @@ TEXT = "<div style='max-width: 320px; white-space: normal'>@text</div>"
 
 
 class Overlaid(NamedTuple):
-    """What may be drawn over the chart of a result, as it was read.
+    """A file of branches or boundaries to draw over the chart of a result.
 
     Attributes
     ----------

@@ -113,7 +113,7 @@ def _overlay(
 ) -> Div:
     """Draw branches or boundaries into a chart; return their legend, or why there are none.
 
-    Whatever the switch shows or hides is appended to ``switched``.
+    All models that the switch shows or hides are appended to ``switched``.
     """
     try:
         over = overlaid.over(result, variable)

@@ -135,7 +135,7 @@ def limits_with(
 
 
 def _inside(values: Any, between: Between) -> Any:
-    """Whether values lie between two limits, each of which may be absent."""
+    """Whether values lie between two limits; None is no limit."""
     low, high = between
     return (values >= (-np.inf if low is None else low)) & (
         values <= (np.inf if high is None else high)

@@ -63,7 +63,7 @@ def boundaries_over(path: str | Path, result: Result, units: str | None = None) 
 
 
 def of_map(axis: str) -> str:
-    """Return the words for a map over several axes, one of which is given."""
+    """Return the words for a map; ``axis``: one of its axes."""
     return f"a map; --at {axis}=VALUE makes a diagram of it"
 
 

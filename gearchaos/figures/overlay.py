@@ -51,7 +51,7 @@ class OverlaidPoint(NamedTuple):
 
 
 class Overlay(NamedTuple):
-    """What is drawn over a figure.
+    """Lines and points to draw over a figure.
 
     Attributes
     ----------

@@ -59,7 +59,7 @@ POINT_MEANINGS = {
     GRAZING_FLIP: "the orbit of a period doubling touches a flank",
     GRAZING_NEIMARK_SACKER: "the orbit of a Neimark-Sacker point touches a flank",
 }
-"""What happens at each kind of point of codimension 2."""
+"""Event at each kind of point of codimension 2."""
 
 CORNER = "meets a grazing, where it has a corner"
 NO_EXTREME = "the gap has no extreme near the flank any more"

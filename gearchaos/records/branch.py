@@ -18,7 +18,7 @@ MEANINGS = {
     "motions begin",
     GRAZING: "the orbit touches a flank with zero speed, so that it gains or loses a contact",
 }
-"""What happens at each kind of special point."""
+"""Event at each kind of special point."""
 
 EDGE, CLOSED_CURVE = "edge of the range", "closes on itself"
 HALVING = "meets the orbit of half its period"
