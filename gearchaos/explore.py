@@ -3,6 +3,9 @@
 Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
 address in the browser is a link to the current view.
 
+--branches and --boundaries draw what `plot` draws with them, and a switch shows or hides it. The
+pointer at a special point shows what happens there.
+
 --save writes an interactive page instead: diagram with stages and exponents, map, or basins, of at
 most 5 MB, for readers without the program. It has no motions of lanes.
 
@@ -52,6 +55,22 @@ class ExploreOptions(NamedTuple):
             "write an interactive page to this file, and do not serve one", "PAGE.html", file=True
         ),
     ] = None
+    branches: Annotated[
+        str | None,
+        Option(
+            "draw the branches of this file of gearchaos branches into the diagram, with a switch",
+            "BRANCHES.h5",
+            file=True,
+        ),
+    ] = None
+    boundaries: Annotated[
+        str | None,
+        Option(
+            "draw the curves of this file of gearchaos boundaries over the map, with a switch",
+            "BOUNDARIES.h5",
+            file=True,
+        ),
+    ] = None
     at: Annotated[
         tuple[Place, ...],
         Option("with --save: use the nearest value of this axis; may be repeated", "NAME=VALUE"),
@@ -81,12 +100,15 @@ def _explore(options: ExploreOptions) -> None:
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
     port = _free_port(HOST, options.port)
+    from gearchaos.explorer.overlay import read_overlaid
     from gearchaos.explorer.page import ExplorerPage
     from gearchaos.explorer.policy import origins, protect
 
+    given = (options.branches, options.boundaries)
+    overlaid = read_overlaid(result, options.result, given, options.units)
     panel.extension()
     server = panel.io.server.get_server(
-        lambda: ExplorerPage(result, options.result, _draw).view(),
+        lambda: ExplorerPage(result, options.result, _draw, overlaid).view(),
         port=port,
         address=HOST,
         websocket_origin=origins(port),
@@ -114,6 +136,7 @@ def _save(result: "Result", options: ExploreOptions) -> None:
     from gearchaos.results.reading.tables import needed
 
     needed("bokeh", "explore")
+    from gearchaos.explorer.overlay import read_overlaid
     from gearchaos.explorer.starts import start_grid
     from gearchaos.explorer.static import static_page
     from gearchaos.finishing import output_of
@@ -121,9 +144,12 @@ def _save(result: "Result", options: ExploreOptions) -> None:
     from gearchaos.results.files.atomic_file import check_output, replacing
     from gearchaos.results.reading.physical_units import in_units
 
-    output = output_of(options.save, options.result)
+    for path in filter(None, (options.branches, options.boundaries, options.result)):
+        output = output_of(options.save, path)
     check_output(output, options.overwrite)
     part = result.sel("within", **placed_coordinates(options.at, result.axes, result.axis))
+    given = (options.branches, options.boundaries)
+    overlaid = read_overlaid(part, options.result, given, options.units)
     grid, found = start_grid(part, options.result), None
     if grid and grid.has_basins and len(grid.axes) == 2:
         others = [axis for axis in part.axes if axis != START]
@@ -134,7 +160,7 @@ def _save(result: "Result", options: ExploreOptions) -> None:
             place = {axis: float(part[axis][0]) for axis in others}
             found = grid.basins(place, options.units or "")
             part = grid.result.sel(None, **place)
-    content = static_page(in_units(part, options.units, physical=False), found)
+    content = static_page(in_units(part, options.units, physical=False), found, overlaid)
     with replacing(output, overwrite=options.overwrite) as partial:
         partial.write_text(content, encoding="utf-8")
     print(output, flush=True)

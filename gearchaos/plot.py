@@ -295,24 +295,13 @@ def _with_boundaries(
         return draw
     from gearchaos.figures.boundaries import add_boundaries
     from gearchaos.figures.lanes import map_axes
-    from gearchaos.results.files.boundary_reader import read_boundaries
+    from gearchaos.figures.overlaid_files import boundaries_over
 
-    found, axes = read_boundaries(options.boundaries), map_axes(result)
-    if {one.name for one in found.parameters} != {*axes}:
-        raise FigureError(
-            f"--boundaries {options.boundaries}: holds curves over "
-            f"{' and '.join(one.name for one in found.parameters)}, and the map is over "
-            f"{' and '.join(axes)}; give the boundaries of this map"
-        )
-    if options.units == "physical":
-        raise FigureError(
-            "--boundaries: the curves are over the swept parameters as configured; leave --units "
-            "physical out, or the boundaries"
-        )
+    found = boundaries_over(options.boundaries, result, options.units)
 
     def drawn() -> "Page":
         figure = draw()
-        add_boundaries(figure, found, axes)
+        add_boundaries(figure, found, map_axes(result))
         return figure
 
     return drawn
@@ -325,25 +314,10 @@ def _with_branches(
     if options.branches is None:
         return draw
     from gearchaos.figures.branches import add_branches
-    from gearchaos.results.files.branch_reader import read_branches
-    from gearchaos.results.reading.result import section_variables
+    from gearchaos.figures.overlaid_files import branches_over
 
-    found, axis = read_branches(options.branches), results[0].axis
-    if options.variable is None and not any(map(section_variables, results)):
-        raise FigureError(
-            f"--branches {options.branches}: are drawn into the diagram of a section, which "
-            f"{options.results[0]} does not hold; name states in outputs.section and run the sweep "
-            "again, or plot the file of branches alone"
-        )
-    if found.parameter.name != axis:
-        raise FigureError(
-            f"--branches {options.branches}: holds branches over {found.parameter.name}, and the "
-            f"diagram is over {axis}; give the branches of this sweep"
-        )
-    if options.units == "physical":
-        raise FigureError(
-            "--branches: branches are dimensionless; leave --units physical out, or the branches"
-        )
+    given = options.results[0], options.variable, options.units
+    found = branches_over(options.branches, results, *given)
 
     def drawn() -> "Page":
         figure = draw()
@@ -359,15 +333,15 @@ def _draws_alone(page: str, options: PlotOptions, *refused: str) -> None:
 
     ``refused``: names of these flags without their dashes.
     """
+    from gearchaos.figures.overlaid_files import draws_alone
+
     given = {name: getattr(options, name) for name in refused}
     if "units" in given:
         given["units"] = given["units"] == "physical"
     faults = {f"--{name}": "have it" for name, value in given.items() if value}
     faults |= {str(path): "are drawn over each other" for path in options.results[1:]}
     for fault, rule in faults.items():
-        raise FigureError(
-            f"{fault}: only diagrams of sweeps {rule}, and here is {page}; leave it out"
-        )
+        raise FigureError(f"{fault}: {draws_alone(rule, page)}")
 
 
 def _labels(results: "Sequence[Result]", options: PlotOptions) -> list[str]:
@@ -393,6 +367,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     from gearchaos.figures import bifurcation_page, control_sweep_page, map_page, shares_page
     from gearchaos.figures.labels import in_words
     from gearchaos.figures.lanes import swept_axes
+    from gearchaos.figures.overlaid_files import of_map, refuse_boundaries_of_diagram
     from gearchaos.figures.style import SINGLE_COLUMN_MM
 
     name = _detail(results[0], options)
@@ -411,16 +386,12 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
-        page = f"a map; --at {maps[0][0]}=VALUE makes a diagram of it"
-        _draws_alone(page, options, "stages", "lines", "branches")
+        _draws_alone(of_map(maps[0][0]), options, "stages", "lines", "branches")
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         name += "_with_boundaries" if options.boundaries else ""
         return [(name, _with_boundaries(results[0], options, draw))]
     if options.boundaries:
-        raise FigureError(
-            f"--boundaries {options.boundaries}: are drawn over maps of two parameters, and here "
-            "is a diagram of one; leave it out"
-        )
+        refuse_boundaries_of_diagram(options.boundaries)
     name += "_stages" if options.stages else ""
     name += "_lines" if options.lines else ""
     shown: dict[str, Any] = {"stages": options.stages, "lines": options.lines}

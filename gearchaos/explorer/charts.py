@@ -15,11 +15,13 @@ from matplotlib.lines import Line2D
 from gearchaos.arrays import Array
 from gearchaos.explorer.shades import COLOURS
 from gearchaos.explorer.text import plain_text
+from gearchaos.figures.branches import limits_with
 from gearchaos.figures.diagrams import waterfall
 from gearchaos.figures.ensembles import basin_patches, basins
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import cell_edges, diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
+from gearchaos.figures.overlay import Overlay
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.style import BLACK
 from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER
@@ -48,8 +50,11 @@ DRAWN = 4000
 """Most points of a line; a longer line is reduced to its outline."""
 
 
-def diagram(result: Result, variable: str) -> Charts:
-    """Draw a variable over one swept parameter, and the largest exponent if the result has it."""
+def diagram(result: Result, variable: str, over: Overlay | None = None) -> Charts:
+    """Draw a variable over one swept parameter, and the largest exponent if the result has it.
+
+    ``over``: what will be drawn over the first chart, whose limits hold it.
+    """
     lanes, drawn = diagram_lanes(result), [variable]
     if LARGEST_EXPONENT in result:
         drawn.append(LARGEST_EXPONENT)
@@ -62,6 +67,8 @@ def diagram(result: Result, variable: str) -> Charts:
         ends = np.nanmin(there, axis=1), np.nanmax(there, axis=1)
         # Without a value: any limits, and a title with the reason.
         height = robust_limits(*ends, hold_zero=bool(charts)) if there.size else (0.0, 1.0)
+        if over and not charts:
+            height = limits_with(over, height, lanes.limits)
         frame = {"xlim": lanes.limits, "ylim": height, "title": "" if there.size else NO_VALUES}
         # Datashader cannot count points whose range is a single value: the limits widen it.
         sides = zip(_dimensions(result, result.axis, name), (lanes.limits, height), strict=True)

@@ -13,7 +13,7 @@ from typing import Any
 import holoviews as hv
 import numpy as np
 import panel as pn
-from bokeh.models import CrosshairTool, Label, Span
+from bokeh.models import CrosshairTool, GlyphRenderer, Label, Span
 
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.engine.recomputing import continued
@@ -22,12 +22,14 @@ from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
 from gearchaos.explorer.charts import Charts, basin_map, diagram, two_parameter_map
 from gearchaos.explorer.motion import SCALES, empty_panel, show
+from gearchaos.explorer.overlay import Overlaid, glyphs, hover, legend
 from gearchaos.explorer.shades import basin_boxes, stage_boxes
 from gearchaos.explorer.starts import AT_START, ATTRACTOR, start_grid
 from gearchaos.explorer.text import plain_text
 from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.labels import axis_label, in_words, unit_of
 from gearchaos.figures.lanes import cell_edges, diagram_lanes, swept_axes
+from gearchaos.figures.overlay import Overlay
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import forces_of
 from gearchaos.figures.style import GREY, VERMILION
@@ -88,9 +90,18 @@ class ExplorerPage:
     draw : callable
         Runs the command `plot` or `basins`, the first of a list of arguments; raises FigureError
         if that fails.
+    overlaid : Overlaid, optional
+        Branches or boundaries to draw over the first chart.
     """
 
-    def __init__(self, result: Result, path: str, draw: Callable[[Sequence[str]], None]) -> None:
+    def __init__(
+        self,
+        result: Result,
+        path: str,
+        draw: Callable[[Sequence[str]], None],
+        overlaid: Overlaid | None = None,
+    ) -> None:
+        self._overlay = _PageOverlay(overlaid)
         self._file, self._path, self._draw = result, path, draw
         self._grid = start_grid(result, path)
         result = self._grid.result if self._grid else result
@@ -116,7 +127,8 @@ class ExplorerPage:
             if axis not in long:
                 choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
         units = ["dimensionless", "physical"]
-        units = units[::-1] if _is_physical(result) else units
+        # Branches and boundaries are dimensionless.
+        units = units[::-1] if not overlaid and _is_physical(result) else units
         choices |= {"units": units, "motion_from": ["end", "start"]}
         self._switches = {
             name: pn.widgets.Select(options=choices[name], **_named(name, result))
@@ -151,6 +163,11 @@ class ExplorerPage:
             moves = name in ("motion_from", *self._swept)
             changed = partial(self._change, name, self._move if moves else self._redraw)
             switch.param.watch(changed, "value")
+        if self._overlay.overlaid:
+            wrong = partial(self._refuse, self._overlay.name)
+            synced = {"value": self._overlay.name}
+            pn.state.location.sync(self._overlay.switch, synced, lambda _, wrong=wrong: wrong())
+            self._overlay.switch.param.watch(lambda _: self._say_commands(), "value")
         self._redraw()
         for name in self._switches:
             self._allowed(name)
@@ -170,10 +187,12 @@ class ExplorerPage:
         panels = [pn.Column(one, styles=QUARTER) for one in self._panels]
         return pn.Column(
             pn.pane.HTML(f"<b>{title}</b> {escape(self._path)}", **WIDE),
-            pn.FlexBox(*self._switches.values()),
+            pn.FlexBox(*self._switches.values(), *self._overlay.switches),
             self._fault,
             pn.FlexBox(
-                pn.Column(self._pointed, self._charts, self._kinds, styles=HALF),
+                pn.Column(
+                    self._pointed, self._charts, self._kinds, self._overlay.legend, styles=HALF
+                ),
                 pn.Column(self._lane, pn.FlexBox(*panels, **WIDE), styles=HALF),
                 **WIDE,
             ),
@@ -275,7 +294,10 @@ class ExplorerPage:
             lines: list[Any] = [zero, *self._marks]
             if chart is charts[0]:
                 lines = [*self._marks, *drawn, self._hint]
-            chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
+            hooks: list[Callable[..., None]] = [partial(_marked, lines)]
+            if chart is charts[0]:
+                hooks.append(self._overlay.hook)
+            chart.opts(tools=[CrosshairTool(overlay=line)], hooks=hooks)
             chart.opts(active_tools=["box_zoom", "wheel_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
@@ -290,13 +312,14 @@ class ExplorerPage:
     def _drawn(self, place: Mapping[str, float]) -> tuple[Charts, list[Any]]:
         """Draw the charts of the sweep at a place on its other axes, with what lies over them."""
         variable, shown = self._value("variable"), self._shown
+        over = self._overlay.drawn(shown, variable, self._value("units"))
         if self._grid and self._grid.has_basins:
             self._basins = self._grid.basins(place, self._value("units"))
             if variable == ATTRACTOR:
                 return basin_map(shown, self._basins)
         if len(self._swept) > 1:
             return two_parameter_map(shown, variable), []
-        charts, _ = diagram(shown, variable)
+        charts, _ = diagram(shown, variable, over)
         boxes, kinds = stage_boxes(shown, diagram_lanes(shown).limits)
         if self._basins:
             boxes, kinds = basin_boxes(self._basins)
@@ -424,7 +447,7 @@ class ExplorerPage:
         between = ["--from", f"{ends[0]}", "--to", f"{ends[1]}"] if ends else []
         how = ["--begin", self._value("motion_from"), "--periods", f"{self._periods}"]
         shown = ["--variable", self._value("variable")]
-        sweep = ["plot", self._path, *here, *between, *shown, *units]
+        sweep = ["plot", self._path, *here, *between, *shown, *units, *self._overlay.arguments]
         if self._grid:
             sweep = ["basins", self._path, *here, *units]
         return {
@@ -465,6 +488,57 @@ class ExplorerPage:
             command, _, *options = self._arguments()[name]
             self._draw([command, str(path), *options, "--output", str(target)])
             return BytesIO(target.read_bytes())
+
+
+class _PageOverlay:
+    """Branches or boundaries on the page of one visitor, with their switch and their legend."""
+
+    def __init__(self, overlaid: Overlaid | None) -> None:
+        self.overlaid, self._drawn = overlaid, list[GlyphRenderer]()
+        self.name = overlaid.option if overlaid else ""
+        self.switch = pn.widgets.Checkbox(name=self.name.capitalize(), value=True)
+        self.legend = pn.pane.HTML("", visible=overlaid is not None, **WIDE)
+        self._text = ""
+        self.switch.param.watch(lambda _: self._show(), "value")
+
+    @property
+    def switches(self) -> list[Any]:
+        """The switch, if there is something to show or hide."""
+        return [self.switch] if self.overlaid else []
+
+    @property
+    def arguments(self) -> list[str]:
+        """Arguments of the command `plot` for what is shown."""
+        shown = self.overlaid is not None and self._drawn and self.switch.value
+        return [f"--{self.name}", self.overlaid.path] if self.overlaid and shown else []
+
+    def drawn(self, result: Result, variable: str, units: str) -> Overlay | None:
+        """Make the lines and markers for a chart, and return what they show."""
+        self._drawn, over = [], None
+        if self.overlaid is None:
+            return None
+        try:
+            if units == "physical":
+                raise FigureError(f"{self.name} are drawn in dimensionless units only")
+            over = self.overlaid.over(result, variable)
+        except FigureError as error:
+            self._text = escape(str(error))
+        else:
+            self._drawn, self._text = glyphs(over), legend(over)
+        self._show()
+        return over
+
+    def hook(self, plot: Any, _element: Any) -> None:
+        """Put lines and markers into the chart when it is first drawn."""
+        if self._drawn and self._drawn[0] not in plot.state.renderers:
+            plot.state.renderers = [*plot.state.renderers, *self._drawn]
+            plot.state.add_tools(hover(self._drawn))
+
+    def _show(self) -> None:
+        """Show or hide them as the switch has it; a reason why there are none stays."""
+        for one in self._drawn:
+            one.visible = self.switch.value
+        self.legend.object = self._text if self.switch.value or not self._drawn else ""
 
 
 def _named(switch: str, result: Result) -> dict[str, Any]:

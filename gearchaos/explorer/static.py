@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from bokeh.embed import file_html
 from bokeh.layouts import column
-from bokeh.models import ColorBar, CustomJS, Div, LinearColorMapper, Select, Span
+from bokeh.models import Checkbox, ColorBar, CustomJS, Div, LinearColorMapper, Select, Span
 from bokeh.plotting import figure
 from bokeh.resources import INLINE
 from matplotlib.colors import ListedColormap, to_hex
@@ -15,9 +15,11 @@ from matplotlib.figure import Figure
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.errors import FigureError
+from gearchaos.explorer.overlay import Overlaid, glyphs, hover, legend
 from gearchaos.explorer.shades import COLOURS, stage_boxes
 from gearchaos.explorer.starts import ATTRACTOR
 from gearchaos.explorer.text import plain_text
+from gearchaos.figures.branches import limits_with
 from gearchaos.figures.diagrams import diagram_variables
 from gearchaos.figures.ensembles import basin_patches, basins
 from gearchaos.figures.labels import axis_label
@@ -48,10 +50,13 @@ LOOK: Any = {
 }
 
 
-def static_page(result: Result, found: Basins | None = None) -> str:
+def static_page(
+    result: Result, found: Basins | None = None, overlaid: Overlaid | None = None
+) -> str:
     """Return an HTML page with the charts of a sweep or a map and a menu of its variables.
 
     ``found``: basins of a result over the two states of a grid of starts; they are drawn first.
+    ``overlaid``: branches or boundaries over the charts, with a switch that shows or hides them.
     Charts with more numbers than fit are thinned out: of each lane the last section points are
     kept, then every n-th lane or cell.
 
@@ -62,21 +67,21 @@ def static_page(result: Result, found: Basins | None = None) -> str:
     """
     numbers = MOST_NUMBERS
     while numbers > 1000:
-        page = _page(result, numbers, found)
+        page = _page(result, numbers, found, overlaid)
         if len(page.encode()) <= LARGEST_PAGE:
             return page
         numbers //= 2
     raise FigureError(f"the page is larger than {LARGEST_PAGE} bytes; choose a slice with --at")
 
 
-def _page(result: Result, numbers: int, found: Basins | None) -> str:
+def _page(result: Result, numbers: int, found: Basins | None, overlaid: Overlaid | None) -> str:
     """Return the page with at most this number of numbers in its charts."""
     of_map = len(swept_axes(result)) > 1
     names = _map_variables(result) if of_map else diagram_variables(result)
     entries = [(name, plain_text(axis_label(result, name, 200))) for name in names]
     entries[:0] = [(ATTRACTOR, ATTRACTOR.capitalize())] if found else []
     names = [name for name, _ in entries]
-    charts, ranges = {}, list[Any]()
+    charts, ranges, switched = {}, list[Any](), list[Any]()
     for name in names:
         # Half of all numbers are those of the basins.
         most = max(1, numbers // (2 * len(names) if found else len(names)))
@@ -88,15 +93,48 @@ def _page(result: Result, numbers: int, found: Basins | None) -> str:
         # All charts move together, whichever is shown.
         panel.x_range = ranges[0] if ranges else panel.x_range
         ranges.append(panel.x_range)
-        charts[name] = column(panel, _text(_legend(kinds)), visible=name == names[0], **WIDE)
+        parts = [panel, _text(_legend(kinds))]
+        if overlaid:
+            parts.append(_overlay(panel, overlaid, result, name, most, switched))
+        charts[name] = column(parts, visible=name == names[0], **WIDE)
     menu = Select(options=entries, value=names[0], title="Variable", width=500)
     show = "for (const [name, one] of Object.entries(charts)) one.visible = name == menu.value"
     menu.js_on_change("value", CustomJS(args={"charts": charts, "menu": menu}, code=show))
     title = _text(f"<b>{escape(str(result.metadata.get('title', '')))}</b>")
-    parts = [title, menu, *charts.values()]
+    switches = [_switch(overlaid.option, switched)] if overlaid else []
+    parts = [title, menu, *switches, *charts.values()]
     if LARGEST_EXPONENT in result and not of_map:
         parts.append(_exponents(result, numbers, ranges[0]))
     return str(file_html(column(parts, **WIDE), INLINE, "gearchaos"))
+
+
+def _overlay(
+    panel: Any, overlaid: Overlaid, result: Result, variable: str, most: int, switched: list[Any]
+) -> Div:
+    """Draw branches or boundaries into a chart; return their legend, or why there are none.
+
+    All models that the switch shows or hides are appended to ``switched``.
+    """
+    try:
+        over = overlaid.over(result, variable)
+    except FigureError as error:
+        return _text(escape(str(error)))
+    drawn, text = glyphs(over, most), _text(legend(over))
+    panel.renderers.extend(drawn)
+    panel.add_tools(hover(drawn))
+    if len(swept_axes(result)) == 1:
+        x, y = panel.x_range, panel.y_range
+        y.start, y.end = limits_with(over, (y.start, y.end), (x.start, x.end))
+    switched += [*drawn, text]
+    return text
+
+
+def _switch(option: str, switched: list[Any]) -> Checkbox:
+    """Return the switch that shows or hides what is drawn over the charts."""
+    switch = Checkbox(label=option.capitalize(), active=True)
+    show = "for (const one of switched) one.visible = box.active"
+    switch.js_on_change("active", CustomJS(args={"switched": switched, "box": switch}, code=show))
+    return switch
 
 
 def _text(markup: str) -> Div:

@@ -12,6 +12,7 @@ from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import label_of
 from gearchaos.figures.lanes import Between
+from gearchaos.figures.overlay import OverlaidLine, OverlaidPoint, Overlay
 from gearchaos.figures.page import Page, continued, footnote, legend_below, page
 from gearchaos.figures.style import BLACK, BLUE, GREEN, PURPLE, SINGLE_COLUMN_MM, VERMILION
 from gearchaos.records.boundary import (
@@ -23,6 +24,7 @@ from gearchaos.records.boundary import (
     GRAZING_FOLD,
     GRAZING_NEIMARK_SACKER,
     POINT_KINDS,
+    POINT_MEANINGS,
     STRONG_RESONANCE_11,
     STRONG_RESONANCE_12,
     WEAKER_RESONANCES,
@@ -80,28 +82,49 @@ def draw_boundaries(
     FigureError
         If the boundaries are not over these parameters.
     """
-    order = _order(found, parameters)
+    over = boundary_overlay(found, parameters)
     names: dict[str, Line2D] = {}
     limits = axes.get_xlim(), axes.get_ylim()
-    several = len({one.period for one in found.boundaries}) > 1
-    for one in found.boundaries:
-        label = f"{one.kind}, period {one.period}" if several else one.kind
-        look: dict[str, Any] = {"linewidth": 1.0 if one.period == 1 else 0.7, **LINES[one.kind]}
+    for one in over.lines:
         # A boundary of one point could not be followed; a dot shows where it is.
-        dot: dict[str, Any] = {"marker": ".", "ms": 3.0} if one.arclength.size == 1 else {}
-        (line,) = axes.plot(*one.values[:, order].T, zorder=3.0, **look, **dot)
+        dot: dict[str, Any] = {"marker": ".", "ms": 3.0} if one.x.size == 1 else {}
+        (line,) = axes.plot(one.x, one.y[:, 0], zorder=3.0, **one.look, **dot)
         line.set_path_effects([withStroke(**_HALO)])
-        names.setdefault(label, line).set_label(label)
+        names.setdefault(one.kind, line).set_label(one.kind)
+    for point in over.points:
+        look: dict[str, Any] = {"ms": 3.2, "mew": 0.7, "mfc": "white", "ls": "none", "zorder": 4.0}
+        (mark,) = axes.plot([point.x], point.y, **look, **point.look)
+        mark.set_path_effects([Stroke(**_HALO), withStroke(linewidth=0.0)])
+        names.setdefault(point.kind, mark).set_label(point.kind)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    return [names[kind] for kind in over.kinds]
+
+
+def boundary_overlay(found: BoundarySet, parameters: Sequence[str] | None = None) -> Overlay:
+    """Return the curves and the points of codimension 2 over parameters along x and y."""
+    order = _order(found, parameters)
+    several = len({one.period for one in found.boundaries}) > 1
+    lines, points = list[OverlaidLine](), list[OverlaidPoint]()
     for one in found.boundaries:
+        kind = f"{one.kind}, period {one.period}" if several else one.kind
+        look = {"linewidth": 1.0 if one.period == 1 else 0.7, **LINES[one.kind]}
+        x, y = one.values[:, order].T
+        lines.append(OverlaidLine(kind, x, y[:, np.newaxis], look))
         for point in one.points:
             place: Floats = point.values[order]
-            look = {"ms": 3.2, "mew": 0.7, "mfc": "white", "ls": "none", "zorder": 4.0}
-            (mark,) = axes.plot(*place[:, np.newaxis], **look, **MARKERS[point.kind])
-            mark.set_path_effects([Stroke(**_HALO), withStroke(linewidth=0.0)])
-            names.setdefault(point.kind, mark).set_label(point.kind)
-    axes.set(xlim=limits[0], ylim=limits[1])
-    lines = [name for kind in LINES for name in sorted(names) if name.split(",")[0] == kind]
-    return [names[name] for name in [*lines, *(kind for kind in POINT_KINDS if kind in names)]]
+            at = ", ".join(
+                f"{name.name} = {value:.8g}"
+                for name, value in zip(found.parameters, point.values, strict=True)
+            )
+            text = f"{point.kind} of period {one.period} at {at}: {POINT_MEANINGS[point.kind]}"
+            look = MARKERS[point.kind]
+            points.append(OverlaidPoint(point.kind, float(place[0]), place[1:], look, text))
+    drawn, marked = {one.kind for one in lines}, {one.kind for one in points}
+    kinds = [
+        *(name for kind in LINES for name in sorted(drawn) if name.split(",")[0] == kind),
+        *(kind for kind in POINT_KINDS if kind in marked),
+    ]
+    return Overlay(lines, points, kinds)
 
 
 def _order(found: BoundarySet, parameters: Sequence[str] | None) -> list[int]:

@@ -13,6 +13,7 @@ from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import check_variable, label_of
 from gearchaos.figures.lanes import Between
+from gearchaos.figures.overlay import OverlaidLine, OverlaidPoint, Overlay
 from gearchaos.figures.page import Page, continued, footnote, legend_below, letter, page
 from gearchaos.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SINGLE_COLUMN_MM, VERMILION
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
@@ -21,6 +22,7 @@ from gearchaos.records.branch import (
     BRANCH_POINT,
     FOLD,
     GRAZING,
+    MEANINGS,
     NEIMARK_SACKER,
     PERIOD_DOUBLING,
     PeriodicBranch,
@@ -38,6 +40,9 @@ MARKERS: dict[str, dict[str, Any]] = {
 
 STABLE: dict[str, Any] = {"color": GREEN, "linestyle": "-", "linewidth": 0.9}
 UNSTABLE: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.6}
+STABLE_ORBITS, UNSTABLE_ORBITS = "stable orbits", "unstable orbits"
+"""Kinds of lines."""
+
 ON_CIRCLE = 1e-6
 """Distance of a multiplier from the unit circle within which its side is not known."""
 
@@ -82,26 +87,59 @@ def draw_branches(
     Stable orbits are solid lines, unstable ones dashed lines. A branch of period n is n lines, one
     for each of its section points. Lines and markers are as in `MARKERS`.
     """
-    name = checked_variable(found, variable)
-    low, high = between
-    limits = (-np.inf if low is None else low, np.inf if high is None else high)
-    heights: list[Floats] = []
+    over = branch_overlay(found, checked_variable(found, variable), between)
     kinds: dict[str, Line2D] = {}
+    for one in over.lines:
+        # Below the markers, above the dots of the sweep.
+        above = 3.0 + (one.kind == STABLE_ORBITS) / 10
+        lines = axes.plot(one.x, one.y, zorder=above, **one.look)
+        kinds.setdefault(one.kind, lines[0]).set_label(one.kind)
+    for point in over.points:
+        look: dict[str, Any] = {"ms": 2.5, "mew": 0.6, "mfc": "white", "ls": "none", "zorder": 4.0}
+        (line,) = axes.plot(np.full(point.y.size, point.x), point.y, **look, **point.look)
+        kinds.setdefault(point.kind, line).set_label(point.kind)
+    axes.set_ylim(*limits_with(over, axes.get_ylim(), between))
+    return [kinds[kind] for kind in over.kinds]
+
+
+def branch_overlay(found: BranchSet, name: str, between: Between = (None, None)) -> Overlay:
+    """Return the lines and special points of branches for one of their variables.
+
+    ``between``: limits of the special points.
+    """
+    lines, points = list[OverlaidLine](), list[OverlaidPoint]()
     for branch in found.branches:
         rows = _rows(found, branch, name)
-        inside = (limits[0] <= branch.value) & (branch.value <= limits[1])
-        heights.append(rows[inside].ravel())
         for piece, stable in _pieces(branch):
-            label = "stable orbits" if stable else "unstable orbits"
-            look = STABLE if stable else UNSTABLE
-            # Below the markers, above the dots of the sweep.
-            lines = axes.plot(branch.value[piece], rows[piece], zorder=3.0 + stable / 10, **look)
-            kinds.setdefault(label, lines[0]).set_label(label)
-        for kind, line in _draw_specials(axes, found, branch, name, limits):
-            kinds.setdefault(kind, line).set_label(kind)
-    _include(axes, np.concatenate([np.zeros(0), *heights]))
-    order = ["stable orbits", "unstable orbits", *MARKERS]
-    return [kinds[kind] for kind in order if kind in kinds]
+            kind, look = (STABLE_ORBITS, STABLE) if stable else (UNSTABLE_ORBITS, UNSTABLE)
+            lines.append(OverlaidLine(kind, branch.value[piece], rows[piece], look))
+        points += _special_points(found, branch, name, between)
+    there = {one.kind for one in lines} | {one.kind for one in points}
+    order = [STABLE_ORBITS, UNSTABLE_ORBITS, *MARKERS]
+    return Overlay(lines, points, [kind for kind in order if kind in there])
+
+
+def limits_with(
+    over: Overlay, limits: tuple[float, float], between: Between = (None, None)
+) -> tuple[float, float]:
+    """Return limits along y, extended to a margin beyond the lines between two values of x."""
+    heights = [one.y[_inside(one.x, between)].ravel() for one in over.lines]
+    there = np.concatenate([np.zeros(0), *heights])
+    there = there[np.isfinite(there)]
+    if not there.size:
+        return limits
+    low, high = limits
+    least, most = float(there.min()), float(there.max())
+    pad = 0.04 * (max(high, most) - min(low, least))
+    return min(low, least - pad), max(high, most + pad)
+
+
+def _inside(values: Any, between: Between) -> Any:
+    """Whether values lie between two limits; None is no limit."""
+    low, high = between
+    return (values >= (-np.inf if low is None else low)) & (
+        values <= (np.inf if high is None else high)
+    )
 
 
 def checked_variable(found: BranchSet, variable: str | None) -> str:
@@ -137,34 +175,24 @@ def _pieces(branch: PeriodicBranch) -> Iterator[tuple[slice, bool]]:
             yield slice(begin, end + 1), bool(stable[begin])
 
 
-def _draw_specials(
-    axes: Axes, found: BranchSet, branch: PeriodicBranch, name: str, limits: tuple[float, float]
-) -> Iterator[tuple[str, Line2D]]:
-    """Draw the special points of a branch within limits; yield the kind and the line of each."""
+def _special_points(
+    found: BranchSet, branch: PeriodicBranch, name: str, between: Between
+) -> Iterator[OverlaidPoint]:
+    """Yield the special points of a branch between limits."""
     sections = [one.name for one in found.states]
     rows = _rows(found, branch, name)
     for special in branch.specials:
-        if not limits[0] <= special.value <= limits[1]:
+        if not _inside(special.value, between):
             continue
         if name in sections:
             heights = special.section[:, sections.index(name)]
         else:
             order = np.interp(special.arclength, branch.arclength, rows[:, 0])
             heights = np.array([order])
-        look: dict[str, Any] = {"ms": 2.5, "mew": 0.6, "mfc": "white", "ls": "none", "zorder": 4.0}
-        values = np.full(heights.size, special.value)
-        (line,) = axes.plot(values, heights, **look, **MARKERS[special.kind])
-        yield special.kind, line
-
-
-def _include(axes: Axes, heights: Floats) -> None:
-    """Extend the limits along y to a margin beyond heights; NaN is ignored."""
-    if not np.isfinite(heights).any():
-        return
-    low, high = axes.get_ylim()
-    least, most = float(np.nanmin(heights)), float(np.nanmax(heights))
-    pad = 0.04 * (max(high, most) - min(low, least))
-    axes.set_ylim(min(low, least - pad), max(high, most + pad))
+        text = f"{special.kind} of period {branch.period} at {found.parameter.name} = "
+        text += f"{special.value:.8g}: {MEANINGS[special.kind]}"
+        text += f" ({special.flank})" if special.flank else ""
+        yield OverlaidPoint(special.kind, special.value, heights, MARKERS[special.kind], text)
 
 
 def add_branches(

@@ -43,6 +43,24 @@ POINT_KINDS = (
 )
 """Kinds of points of codimension 2."""
 
+POINT_MEANINGS = {
+    CUSP: "two folds meet and end",
+    STRONG_RESONANCE_11: "a Neimark-Sacker curve ends at a fold, with two multipliers at 1",
+    STRONG_RESONANCE_12: "a Neimark-Sacker curve ends at a period doubling, with two multipliers "
+    "at -1",
+    **{
+        kind: f"the multipliers on the unit circle turn by a {part} of a revolution per period"
+        for kind, part in zip(WEAKER_RESONANCES, ("third", "quarter"), strict=True)
+    },
+    FOLD_FLIP: "a fold and a period doubling happen at once",
+    FOLD_NEIMARK_SACKER: "a fold and a Neimark-Sacker point happen at once",
+    FLIP_NEIMARK_SACKER: "a period doubling and a Neimark-Sacker point happen at once",
+    GRAZING_FOLD: "the orbit of a fold touches a flank",
+    GRAZING_FLIP: "the orbit of a period doubling touches a flank",
+    GRAZING_NEIMARK_SACKER: "the orbit of a Neimark-Sacker point touches a flank",
+}
+"""Event at each kind of point of codimension 2."""
+
 CORNER = "meets a grazing, where it has a corner"
 NO_EXTREME = "the gap has no extreme near the flank any more"
 NOT_STARTED = "the special point of a branch is no point of a boundary"

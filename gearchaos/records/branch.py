@@ -10,6 +10,16 @@ GRAZING = "grazing"
 SPECIAL_KINDS = (FOLD, BRANCH_POINT, PERIOD_DOUBLING, NEIMARK_SACKER, GRAZING)
 """Kinds of special points of a branch."""
 
+MEANINGS = {
+    FOLD: "two orbits meet and end, and the branch turns back",
+    BRANCH_POINT: "another branch of the same period crosses",
+    PERIOD_DOUBLING: "a multiplier passes -1, and a branch of twice the period begins",
+    NEIMARK_SACKER: "a complex pair of multipliers passes the unit circle, and quasi-periodic "
+    "motions begin",
+    GRAZING: "the orbit touches a flank with zero speed, so that it gains or loses a contact",
+}
+"""Event at each kind of special point."""
+
 EDGE, CLOSED_CURVE = "edge of the range", "closes on itself"
 HALVING = "meets the orbit of half its period"
 TOO_MANY = "too many points"

@@ -1,0 +1,80 @@
+"""Files that are drawn over the figure of a result; those of another sweep are refused."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from gearchaos.errors import FigureError
+from gearchaos.figures.lanes import map_axes
+from gearchaos.results.files.boundary_file import BoundarySet
+from gearchaos.results.files.boundary_reader import read_boundaries
+from gearchaos.results.files.branch_file import BranchSet
+from gearchaos.results.files.branch_reader import read_branches
+from gearchaos.results.reading.result import Result, section_variables
+
+
+def branches_over(
+    path: str | Path,
+    results: Sequence[Result],
+    source: str | Path,
+    variable: str | None = None,
+    units: str | None = None,
+) -> BranchSet:
+    """Read the branches of ``--branches`` for the diagram of results; ``source``: their file.
+
+    Raises FigureError if branches and diagram do not belong together.
+    """
+    found, axis = read_branches(path), results[0].axis
+    if variable is None and not any(map(section_variables, results)):
+        raise FigureError(
+            f"--branches {path}: are drawn into the diagram of a section, which {source} does not "
+            "hold; name states in outputs.section and run the sweep again, or plot the file of "
+            "branches alone"
+        )
+    if found.parameter.name != axis:
+        raise FigureError(
+            f"--branches {path}: holds branches over {found.parameter.name}, and the diagram is "
+            f"over {axis}; give the branches of this sweep"
+        )
+    if units == "physical":
+        raise FigureError(
+            "--branches: branches are dimensionless; leave --units physical out, or the branches"
+        )
+    return found
+
+
+def boundaries_over(path: str | Path, result: Result, units: str | None = None) -> BoundarySet:
+    """Read the boundaries of ``--boundaries`` for the map of a result.
+
+    Raises FigureError if boundaries and map do not belong together.
+    """
+    found, axes = read_boundaries(path), map_axes(result)
+    if {one.name for one in found.parameters} != {*axes}:
+        raise FigureError(
+            f"--boundaries {path}: holds curves over "
+            f"{' and '.join(one.name for one in found.parameters)}, and the map is over "
+            f"{' and '.join(axes)}; give the boundaries of this map"
+        )
+    if units == "physical":
+        raise FigureError(
+            "--boundaries: the curves are over the swept parameters as configured; leave --units "
+            "physical out, or the boundaries"
+        )
+    return found
+
+
+def of_map(axis: str) -> str:
+    """Return the words for a map; ``axis``: one of its axes."""
+    return f"a map; --at {axis}=VALUE makes a diagram of it"
+
+
+def refuse_boundaries_of_diagram(path: str | Path) -> None:
+    """Raise a FigureError: the diagram of one parameter has no boundaries."""
+    raise FigureError(
+        f"--boundaries {path}: are drawn over maps of two parameters, and here is a diagram of "
+        "one; leave it out"
+    )
+
+
+def draws_alone(rule: str, page: str) -> str:
+    """Return the end of the message for what only diagrams of sweeps support."""
+    return f"only diagrams of sweeps {rule}, and here is {page}; leave it out"
