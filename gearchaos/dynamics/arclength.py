@@ -43,6 +43,9 @@ ROUNDING = 1e-15
 NEAR_ENOUGH = 1e-5
 """Longest step of Newton's method after which the derivative by the parameter is used again."""
 
+CONTRACTION = 0.1
+"""Largest ratio of successive distances with which the derivative is used again."""
+
 HALF_RETURN = 1e-2
 """Half-period return distance below which a curve ends in an orbit of half the period.
 
@@ -192,16 +195,20 @@ class Curve(NamedTuple):
                     break
                 return self._point(place, slopes, direction, size, passed)
             if stalled:
-                break
+                if by_share is None:
+                    break
+                # An old derivative is not enough where the equations are nearly singular.
+                last, by_share = np.inf, None
+                continue
             try:
                 bordered = np.vstack([slopes, direction])
                 step = np.linalg.solve(bordered, np.append(defect, 0.0))
             except np.linalg.LinAlgError:
                 break
-            place, last = place - step, size
             # After a short step the derivative by the parameter has changed little. To compute it
             # costs as much as the orbit if the parameter changes the flow maps.
-            by_share = slopes[:, -1] if np.linalg.norm(step) <= NEAR_ENOUGH else None
+            short = np.linalg.norm(step) <= NEAR_ENOUGH and size < CONTRACTION * last
+            place, last, by_share = place - step, size, slopes[:, -1] if short else None
         return None
 
     def doubled(self) -> Self:

@@ -225,8 +225,11 @@ def tracing(
     starts = [start] if one_way else [start, start._replace(tangent=-start.tangent)]
     (ahead, last), *back = yield from together([_half(curve, one) for one in starts])
     behind, first = back[0] if back else ([start], HALVING)
+    # One direction is enough for a closed curve, where the other may have been lost.
     if last == CLOSED_CURVE:
         behind, first = [start], last
+    elif first == CLOSED_CURVE:
+        ahead, last = [start], first
     points = [one._replace(tangent=-one.tangent) for one in behind[:0:-1]] + ahead
     return (yield from _with_specials(curve, points, (first, last), located))
 

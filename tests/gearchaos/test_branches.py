@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBLING
+from gearchaos.records.branch import (
+    CLOSED_CURVE,
+    FOLD,
+    GRAZING,
+    NEIMARK_SACKER,
+    PERIOD_DOUBLING,
+)
 from gearchaos.results.files.branch_reader import read_branches
 
 from .commands import run_module
@@ -133,6 +139,45 @@ def test_a_fold_next_to_a_grazing_point_is_told_from_it():
         max(one for one in of_kind(two_masses(), kind) if one < 0.7) for kind in (FOLD, GRAZING)
     )
     assert 0.0 < abs(fold - grazing) < 1e-7
+
+
+@cache
+def isolated(frequency, state):
+    """Return the branch of period 4 through the motion at a frequency, beginning at a state."""
+    config = gearchaos.load_config(SWEEPS / "two_masses.toml", ['integration.method="flow_map"'])
+    named = dict(zip(("x1", "x1_rate", "x2", "x2_rate"), state, strict=True))
+    config = config.replace("start", {"kind": "given", "state": named})
+    system = gearchaos.System(config, frequency=frequency)
+    return system.branch(system.orbit(4), "frequency", 0.55, 0.8)
+
+
+ONE = 0.618, (0.909, 0.326, 0.612, 0.223)
+OTHER = 0.6155, (0.9234, 0.2171, 0.6416, 0.1733)
+
+
+def test_an_isolated_branch_is_followed_until_it_closes_on_itself():
+    branch = isolated(*ONE)
+    assert branch.ends == (CLOSED_CURVE, CLOSED_CURVE)
+    # Nowhere does it reach an edge of the range, or the orbit of half its period.
+    assert branch.value.min() > 0.6
+    assert branch.value.max() < 0.63
+    # Beyond its last point it goes on to its first, perhaps at another of its section points.
+    phase = np.argmin(np.linalg.norm(branch.section[-1] - branch.section[0, -1], axis=1))
+    before, last = (np.append(branch.section[at, phase], branch.value[at]) for at in (-2, -1))
+    first, second = (np.append(branch.section[at, -1], branch.value[at]) for at in (0, 1))
+    assert (first - last) @ (second - first) > 0.0
+    assert (first - last) @ (last - before) > 0.0
+    assert np.linalg.norm(first - last) < 0.1
+    # A closed curve turns back as often as it turns forth.
+    assert len(of_kind(branch, FOLD)) % 2 == 0
+
+
+def test_an_isolated_branch_does_not_depend_on_where_it_was_begun():
+    one, other = isolated(*ONE), isolated(*OTHER)
+    assert other.ends == one.ends
+    for kind in (FOLD, PERIOD_DOUBLING, GRAZING):
+        assert len(of_kind(one, kind)) >= 2
+        assert of_kind(one, kind) == pytest.approx(of_kind(other, kind), abs=1e-9)
 
 
 def test_stability_changes_at_special_points_only():
