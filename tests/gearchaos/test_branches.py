@@ -161,13 +161,16 @@ def test_an_isolated_branch_is_followed_until_it_closes_on_itself():
     # Nowhere does it reach an edge of the range, or the orbit of half its period.
     assert branch.value.min() > 0.6
     assert branch.value.max() < 0.63
-    # Beyond its last point it goes on to its first, perhaps at another of its section points.
+    # Its first orbit lies between the last two, perhaps at another of its section points.
     phase = np.argmin(np.linalg.norm(branch.section[-1] - branch.section[0, -1], axis=1))
     before, last = (np.append(branch.section[at, phase], branch.value[at]) for at in (-2, -1))
     first, second = (np.append(branch.section[at, -1], branch.value[at]) for at in (0, 1))
-    assert (first - last) @ (second - first) > 0.0
-    assert (first - last) @ (last - before) > 0.0
-    assert np.linalg.norm(first - last) < 0.1
+    chord = last - before
+    assert 0.0 <= (first - before) @ chord <= chord @ chord
+    assert (second - first) @ chord > 0.0
+    assert np.linalg.norm(first - before - (first - before) @ chord / (chord @ chord) * chord) < (
+        0.1 * np.linalg.norm(chord)
+    )
     # A closed curve turns back as often as it turns forth.
     assert len(of_kind(branch, FOLD)) % 2 == 0
 
