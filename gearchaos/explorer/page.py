@@ -112,14 +112,7 @@ class ExplorerPage:
         if self._grid:
             self._swept = self._grid.axes[:2]
         self._others = [axis for axis in result.axes if axis not in self._swept]
-        recorded = result.metadata.get("recorded_periods")
-        self._periods = DEFAULT_PERIODS
-        repeats = excitation_of(result.metadata).excitation_period
-        if repeats <= MOST_PERIODS:
-            # Lines of the shafts are resolved by a whole period of the excitation.
-            self._periods = max(DEFAULT_PERIODS, repeats)
-        if isinstance(recorded, int) and recorded > 0:
-            self._periods = min(self._periods, recorded)
+        self._periods = _periods_of(result)
         choices: dict[str, Any] = {"variable": self._variables()}
         long = [axis for axis in self._others if result[axis].size > MOST_ENTRIES]
         self._numbers = [*self._swept, *long]
@@ -539,6 +532,18 @@ class _PageOverlay:
         for one in self._drawn:
             one.visible = self.switch.value
         self.legend.object = self._text if self.switch.value or not self._drawn else ""
+
+
+def _periods_of(result: Result) -> int:
+    """Return the mesh periods of a motion on the page."""
+    periods, recorded = DEFAULT_PERIODS, result.metadata.get("recorded_periods")
+    repeats = excitation_of(result.metadata).excitation_period
+    if repeats <= MOST_PERIODS:
+        # Lines of the shafts are resolved by a whole period of the excitation.
+        periods = max(DEFAULT_PERIODS, repeats)
+    if isinstance(recorded, int) and recorded > 0:
+        periods = min(periods, recorded)
+    return periods
 
 
 def _named(switch: str, result: Result) -> dict[str, Any]:
