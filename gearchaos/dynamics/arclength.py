@@ -6,7 +6,7 @@ therefore found on both sides of +1, however fast it changes with the parameter.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Self, TypeAlias
+from typing import Any, NamedTuple, Protocol, Self, TypeAlias
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
@@ -376,6 +376,32 @@ def end_of_curve(
 def along_the_way(states: int) -> Floats:
     """Return the unit vector (states + 1,) in which only the parameter changes."""
     return np.append(np.zeros(states), 1.0)
+
+
+class OnCurve(Protocol):
+    """A point of a curve: its place, and the unit vector in which the curve is followed."""
+
+    @property
+    def place(self) -> Floats: ...
+    @property
+    def tangent(self) -> Floats: ...
+
+
+def extended(last: Sequence[OnCurve], step: float) -> Floats:
+    """Return the place a step beyond the last one or two points of a curve.
+
+    The cubic through two points and their tangents is extended; one point has its tangent only.
+    """
+    *before, here = last
+    ahead = here.place + step * here.tangent
+    if not before:
+        return ahead
+    chord = here.place - before[0].place
+    length = np.linalg.norm(chord)
+    slope, old = chord / length, before[0].tangent
+    square = (2.0 * here.tangent + old - 3.0 * slope) / length
+    cube = (here.tangent + old - 2.0 * slope) / length**2
+    return np.asarray(ahead + step**2 * square + step**3 * cube)
 
 
 def _at_share(

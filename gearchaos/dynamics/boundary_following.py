@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
+from gearchaos.dynamics.arclength import extended
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
@@ -178,7 +179,7 @@ def _next(
 ) -> Following[tuple[OnBoundary | None, bool]]:
     """Search the next point of a boundary, or None, and whether it lies at an edge."""
     here = points[-1]
-    ahead = _ahead(points[-2:], step)
+    ahead = extended(points[-2:], step)
     guess, direction = among_columns(equations, ahead, here.tangent, 0.5 * step)
     outside = (guess < 0.0) | (guess > 1.0)
     outside[:-PARAMETERS] = False
@@ -192,23 +193,6 @@ def _next(
         outside[:-PARAMETERS] = False
         guess = trial.place
     return (yield from _at_edge(equations, here, guess, step, outside)), True
-
-
-def _ahead(last: Sequence[OnBoundary], step: float) -> Floats:
-    """Return the place a step beyond the last points of a boundary (states + 2,).
-
-    The cubic through two points and their tangents is extended; one point has its tangent only.
-    """
-    *before, here = last
-    ahead = here.place + step * here.tangent
-    if not before:
-        return ahead
-    chord = here.place - before[0].place
-    length = np.linalg.norm(chord)
-    slope, old = chord / length, before[0].tangent
-    square = (2.0 * here.tangent + old - 3.0 * slope) / length
-    cube = (here.tangent + old - 2.0 * slope) / length**2
-    return np.asarray(ahead + step**2 * square + step**3 * cube)
 
 
 def fixed_direction(equations: Equations, tangent: Floats) -> Floats:

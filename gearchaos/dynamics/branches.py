@@ -27,6 +27,7 @@ from gearchaos.dynamics.arclength import (
     Finding,
     along_the_way,
     defects_of,
+    extended,
 )
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.records.branch import (
@@ -315,7 +316,7 @@ def _next(
 ) -> Finding[tuple[CurvePoint | None, bool]]:
     """Search the next point of a curve, or None, and whether the range ends there."""
     here = last[-1]
-    guess = _ahead(last, step)
+    guess = extended(last, step)
     if 0.0 <= guess[-1] <= 1.0:
         trial = yield from curve.correcting(guess, here.tangent)
         if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
@@ -332,23 +333,6 @@ def _next(
     # The tangent of a point at the edge has the direction of the parameter.
     onward = np.sign(trial.tangent @ here.tangent) or 1.0
     return trial._replace(tangent=onward * trial.tangent), True
-
-
-def _ahead(last: Sequence[CurvePoint], step: float) -> Floats:
-    """Return the place a step beyond the last points of a curve (states + 1,).
-
-    The cubic through two points and their tangents is extended; one point has its tangent only.
-    """
-    *before, here = last
-    ahead = here.place + step * here.tangent
-    if not before:
-        return ahead
-    chord = here.place - before[0].place
-    length = np.linalg.norm(chord)
-    slope, old = chord / length, before[0].tangent
-    square = (2.0 * here.tangent + old - 3.0 * slope) / length
-    cube = (here.tangent + old - 2.0 * slope) / length**2
-    return ahead + step**2 * square + step**3 * cube
 
 
 def _succeeds(here: CurvePoint, trial: CurvePoint, step: float) -> bool:
