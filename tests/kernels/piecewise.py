@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import pytest
+from gearchaos_kernels import Plan, integrate
 from gearchaos_kernels.models.linear.system import LinearSystems
 from scipy.integrate import solve_ivp
 
@@ -234,3 +236,20 @@ def exact(coordinates, elements, count=6):
         growths.append(np.diff(np.log(lengths), prepend=0.0))
         crossings.append(crossed)
     return machines, np.array(starts), np.array(sections), np.array(growths), np.array(crossings)
+
+
+def assert_exact(machine: Piecewise, seed: int, plan: Plan) -> None:
+    """Integrate a machine from a random start, and compare it with the adaptive method."""
+    count = len(machine.mass)
+    start = np.random.default_rng(seed).normal(size=2 * count) * 0.5
+    tangent = np.full(2 * count, 1.0 / np.sqrt(2 * count))
+    motion, crossed = machine.periods(
+        np.concatenate([start, tangent]), plan.transient_periods + plan.recorded_periods
+    )
+    found = integrate(lanes_of([machine]), alternating(start, count)[np.newaxis], plan)
+    assert found.crossings[0] == crossed
+    section = alternating(motion[:, : 2 * count], count)
+    scale = max(1.0, np.abs(section).max())
+    assert found.section[0] == pytest.approx(section, abs=1e-10 * scale)
+    lengths = np.log(np.linalg.norm(motion[:, 2 * count :], axis=1))
+    assert found.growth[0] == pytest.approx(np.diff(lengths, prepend=0.0), abs=1e-10)

@@ -17,7 +17,7 @@ from .piecewise import (
     SIZES,
     SIZES_OF_MAPS,
     WITH_LOADS,
-    alternating,
+    assert_exact,
     exact,
     lanes_of,
     random_machine,
@@ -122,18 +122,8 @@ def test_the_state_in_contact_is_at_rest():
 def test_flow_maps_are_exact_for_random_systems_with_and_without_springs_to_the_ground(
     size, seed, held, step
 ):
-    machine, count = random_machine(seed, *size, held), size[0]
-    start = np.random.default_rng(seed).normal(size=2 * count) * 0.5
-    tangent = np.full(2 * count, 1.0 / np.sqrt(2 * count))
-    exact, crossed = machine.periods(np.concatenate([start, tangent]), 2)
     plan = Plan(step, 0, 2, 2, tangent=True, contact=True, method="flow_map")
-    found = integrate(lanes_of([machine]), alternating(start, count)[np.newaxis], plan)
-    assert found.crossings[0] == crossed
-    section = alternating(exact[:, : 2 * count], count)
-    scale = max(1.0, np.abs(section).max())
-    assert found.section[0] == pytest.approx(section, abs=1e-10 * scale)
-    lengths = np.log(np.linalg.norm(exact[:, 2 * count :], axis=1))
-    assert found.growth[0] == pytest.approx(np.diff(lengths, prepend=0.0), abs=1e-10)
+    assert_exact(random_machine(seed, *size, held), seed, plan)
 
 
 @pytest.mark.parametrize("size", SIZES_OF_MAPS, ids=str)

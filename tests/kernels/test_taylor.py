@@ -12,7 +12,7 @@ from .piecewise import (
     PERIODS,
     SIZES,
     WITH_LOADS,
-    alternating,
+    assert_exact,
     exact,
     lanes_of,
     random_machine,
@@ -44,18 +44,7 @@ def test_series_are_exact_where_elements_of_every_kind_cross(size, steps):
 def test_series_are_exact_for_random_systems_with_and_without_springs_to_the_ground(
     size, seed, held, steps
 ):
-    machine, count = random_machine(seed, *size, held), size[0]
-    start = np.random.default_rng(seed).normal(size=2 * count) * 0.5
-    tangent = np.full(2 * count, 1.0 / np.sqrt(2 * count))
-    motion, crossed = machine.periods(np.concatenate([start, tangent]), PERIODS)
-    plan = Plan(steps, **WITHOUT_LOADS)
-    found = integrate(lanes_of([machine]), alternating(start, count)[np.newaxis], plan)
-    assert found.crossings[0] == crossed
-    section = alternating(motion[:, : 2 * count], count)
-    scale = max(1.0, np.abs(section).max())
-    assert found.section[0] == pytest.approx(section, abs=1e-10 * scale)
-    lengths = np.log(np.linalg.norm(motion[:, 2 * count :], axis=1))
-    assert found.growth[0] == pytest.approx(np.diff(lengths, prepend=0.0), abs=1e-10)
+    assert_exact(random_machine(seed, *size, held), seed, Plan(steps, **WITHOUT_LOADS))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
