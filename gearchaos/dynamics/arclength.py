@@ -151,6 +151,10 @@ class Curve(NamedTuple):
         Period in excitation periods.
     scale : array, shape (states,)
         Scales of the states.
+    ahead : int
+        Number of points that are predicted and corrected side by side.
+    own_maps : bool
+        Whether every value of the parameter has flow maps of its own.
     """
 
     systems_at: Callable[[Integers, Floats], LaneSystem]
@@ -158,6 +162,8 @@ class Curve(NamedTuple):
     plan: Plan
     periods: int
     scale: Floats
+    ahead: int = 1
+    own_maps: bool = False
 
     def through(self, point: Floats, share: float) -> Self:
         """Return the curve with the scales of the orbit with state ``point`` at a share of it."""
@@ -179,8 +185,10 @@ class Curve(NamedTuple):
         largest = float(np.max(np.abs(place[:-1] * self.scale)))
         return float(np.max(np.abs(defect * self.scale))) <= ROUNDING_OF_STATES * largest
 
-    def correcting(self, guess: Floats, direction: Floats) -> "Finding[CurvePoint | None]":
-        """Return the search of `corrected`."""
+    def correcting(
+        self, guess: Floats, direction: Floats, reach: float = np.inf
+    ) -> "Finding[CurvePoint | None]":
+        """Return the search of `corrected`; None also where it leads farther away than a reach."""
         place, last = guess, np.inf
         by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
@@ -207,8 +215,12 @@ class Curve(NamedTuple):
                 break
             # After a short step the derivative by the parameter has changed little. To compute it
             # costs as much as the orbit if the parameter changes the flow maps.
-            short = np.linalg.norm(step) <= NEAR_ENOUGH and size < CONTRACTION * last
+            short = (
+                self.own_maps and np.linalg.norm(step) <= NEAR_ENOUGH and size < CONTRACTION * last
+            )
             place, last, by_share = place - step, size, slopes[:, -1] if short else None
+            if np.linalg.norm(place - guess) > reach:
+                break
         return None
 
     def doubled(self) -> Self:
@@ -387,21 +399,36 @@ class OnCurve(Protocol):
     def tangent(self) -> Floats: ...
 
 
-def extended(last: Sequence[OnCurve], step: float) -> Floats:
-    """Return the place a step beyond the last one or two points of a curve.
+def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats]:
+    """Extend a curve beyond its last one or two points.
 
     The cubic through two points and their tangents is extended; one point has its tangent only.
+
+    Parameters
+    ----------
+    last : sequence of OnCurve
+        The last one or two points of the curve.
+    distances : array, shape (distances,)
+        Distances from the last point.
+
+    Returns
+    -------
+    places, tangents : array, shape (distances, n)
+        Places of the extension, and its unit tangents there.
     """
     *before, here = last
+    step = distances[:, np.newaxis]
     ahead = here.place + step * here.tangent
     if not before:
-        return ahead
+        return ahead, np.broadcast_to(here.tangent, ahead.shape)
     chord = here.place - before[0].place
     length = np.linalg.norm(chord)
     slope, old = chord / length, before[0].tangent
     square = (2.0 * here.tangent + old - 3.0 * slope) / length
     cube = (here.tangent + old - 2.0 * slope) / length**2
-    return np.asarray(ahead + step**2 * square + step**3 * cube)
+    tangents = here.tangent + 2.0 * step * square + 3.0 * step**2 * cube
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    return ahead + step**2 * square + step**3 * cube, tangents
 
 
 def _at_share(

@@ -179,7 +179,7 @@ def _next(
 ) -> Following[tuple[OnBoundary | None, bool]]:
     """Search the next point of a boundary, or None, and whether it lies at an edge."""
     here = points[-1]
-    ahead = extended(points[-2:], step)
+    (ahead,), _ = extended(points[-2:], np.array([step]))
     guess, direction = among_columns(equations, ahead, here.tangent, 0.5 * step)
     outside = (guess < 0.0) | (guess > 1.0)
     outside[:-PARAMETERS] = False

@@ -5,9 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
+from gearchaos_kernels.methods.registry import METHODS
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
+
+LANES_AHEAD, MOST_AHEAD = 64, 4
+"""About how many lanes may search the points ahead of one, and the largest number of points."""
+
+WITH_OWN_MAPS = 2
+"""Number of points ahead where each has flow maps of its own, which cost more than their lanes."""
 
 
 class BranchRange(NamedTuple):
@@ -43,7 +50,11 @@ class BranchRange(NamedTuple):
 
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
-        whole = period * self.system_at(np.zeros(1)).repeats_after
+        amid = self.system_at(np.array([0.25, 0.75]))
+        own_maps = bool(np.ptp(METHODS[plan.method].sharing(amid)))
+        ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
+        whole = period * amid.repeats_after
         steps, method = plan.steps_per_period, plan.method
         plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
-        return Curve(self.systems_at, 0, plan, period, scale)
+        ahead = min(max(ahead, 1), MOST_AHEAD)
+        return Curve(self.systems_at, 0, plan, period, scale, ahead, own_maps)

@@ -58,6 +58,12 @@ LOCATED = 1e-11
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
 
+RATIO = 1.6
+"""Ratio of the distances at which points ahead are predicted."""
+
+FALL = 2.5
+"""The same where points were not found, such as next to a grazing: steps shrink by orders there."""
+
 ASIDE = 0.1
 """Largest share of a step by which a point may lie aside of its prediction, on another branch."""
 
@@ -286,59 +292,120 @@ def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | No
 
 def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], str]]:
     """Follow a branch in the direction of a point's tangent; return its points and why it ends."""
-    points, step = [start], FIRST_STEP
+    points, distances = [start], _distances(FIRST_STEP, curve.ahead)
     while len(points) < MOST_POINTS:
         here = points[-1]
-        trial, leaves = yield from _next(curve, points[-2:], step)
-        longer = 0.5 if trial is None else _boldness(here, trial)
-        if trial is None or not _succeeds(here, trial, step):
-            step *= min(max(longer, 0.25), 0.8)
-            if step < SHORTEST_STEP:
-                return points, LOST
-            continue
-        if _passes_half(here, trial):
-            if here.half_return < SIDEWAYS:
-                return points, HALVING
-            step /= 2.0
-            continue
-        length = np.linalg.norm(trial.place - here.place)
-        points += [trial] if length > 0.0 else []
-        if leaves:
+        trials, leaves = yield from _next(curve, points[-2:], distances)
+        taken = 0
+        while taken < len(trials):
+            further = _farthest(points[-1], trials[taken:])
+            if not further:
+                break
+            taken += further
+            trial = trials[taken - 1]
+            assert trial is not None, "the farthest point is found"
+            if len(points) > 2 and (yield from _meets(curve, points[-1], trial, start)):
+                return [*points, trial], CLOSED_CURVE
+            points.append(trial)
+        if leaves and taken == len(trials):
             return points, EDGE
-        if len(points) > 3 and (yield from _meets(curve, here, trial, start)):
-            return points, CLOSED_CURVE
-        step = min(max(min(longer, 2.0) * step, min(step, FIRST_STEP)), LONGEST)
+        first = trials[0]
+        if taken:
+            # Far beyond the first that fails, hardly any is found.
+            distances = _distances(_after(*points[-2:]), min(taken + 3, curve.ahead))
+            continue
+        if first is not None and _passes_half(here, first) and here.half_return < SIDEWAYS:
+            return points, HALVING
+        longer = 0.5 if first is None else _boldness(here, first)
+        distances = _shorter(float(distances[0]) * min(max(longer, 0.25), 0.8), curve.ahead)
+        if distances[0] < SHORTEST_STEP:
+            return points, LOST
     return points, TOO_MANY
 
 
+def _distances(step: float, many: int) -> Floats:
+    """Return the distances, (many,), at which points ahead are predicted: about a step, and more.
+
+    The shortest is tried with the others, because a step may turn out to be too long.
+    """
+    first = -(many // 3)
+    distances = step * RATIO ** np.arange(first, first + many)
+    gaps = np.diff(distances, prepend=0.0)
+    return np.asarray(np.cumsum(np.minimum(gaps, LONGEST)))
+
+
+def _shorter(step: float, many: int) -> Floats:
+    """Return the distances, (many,), that are tried after one was too long: a step, and less."""
+    return np.asarray(step * FALL ** -np.arange(many - 1.0, -1.0, -1.0))
+
+
+def _farthest(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> int:
+    """Return how many of the next points of a curve a point may be joined to; the last is taken."""
+    number = 0
+    for trial in trials:
+        if trial is None or not _succeeds(here, trial) or _passes_half(here, trial):
+            break
+        number += 1
+    return number
+
+
+def _after(here: CurvePoint, trial: CurvePoint) -> float:
+    """Return the next step after the one from a point to another."""
+    length = float(np.linalg.norm(trial.place - here.place))
+    longer = min(_boldness(here, trial), 2.0)
+    return min(max(longer * length, min(length, FIRST_STEP)), LONGEST)
+
+
 def _next(
-    curve: Curve, last: Sequence[CurvePoint], step: float
-) -> Finding[tuple[CurvePoint | None, bool]]:
-    """Search the next point of a curve, or None, and whether the range ends there."""
+    curve: Curve, last: Sequence[CurvePoint], distances: Floats
+) -> Finding[tuple[list[CurvePoint | None], bool]]:
+    """Search the next points of a curve, and whether the last of them is the end of the range.
+
+    ``distances``: those at which points are predicted. A point is None if it is not found near its
+    prediction.
+    """
     here = last[-1]
-    guess = extended(last, step)
-    if 0.0 <= guess[-1] <= 1.0:
-        trial = yield from curve.correcting(guess, here.tangent)
-        if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
-            return None, False
-        if 0.0 <= trial.share <= 1.0:
-            return trial, False
-    edge = float(guess[-1] > 0.5)
+    guesses, directions = extended(last, distances)
+    inside = (guesses[:, -1] >= 0.0) & (guesses[:, -1] <= 1.0)
+    within = distances.size if inside.all() else int(np.argmin(inside))
+    reaches = ASIDE * np.diff(distances, prepend=0.0)
+    searches = [curve.correcting(guesses[at], directions[at], reaches[at]) for at in range(within)]
+    leaves = within < distances.size
+    if leaves:
+        searches.append(_at_edge(curve, here, guesses[within], distances[within]))
+    trials = yield from together(searches)
+    outside = [one is not None and not 0.0 <= one.share <= 1.0 for one in trials]
+    if not any(outside):
+        return trials, leaves
+    number = outside.index(True)
+    beyond = trials[number]
+    assert beyond is not None
+    edge = yield from _at_edge(curve, here, beyond.place, distances[number])
+    return [*trials[:number], edge], True
+
+
+def _at_edge(
+    curve: Curve, here: CurvePoint, beyond: Floats, step: float
+) -> Finding[CurvePoint | None]:
+    """Search the point at the edge of the range between a point and a place beyond."""
+    edge = float(beyond[-1] > 0.5)
     reach = (edge - here.share) / here.tangent[-1] if here.tangent[-1] else np.inf
     guess = here.place + min(max(reach, 0.0), step) * here.tangent
     guess[-1] = edge
     trial = yield from curve.correcting(guess, along_the_way(guess.size - 1))
     if trial is None or np.linalg.norm(trial.place - here.place) > 2.0 * step:
-        return None, True
+        return None
     # The tangent of a point at the edge has the direction of the parameter.
     onward = np.sign(trial.tangent @ here.tangent) or 1.0
-    return trial._replace(tangent=onward * trial.tangent), True
+    return trial._replace(tangent=onward * trial.tangent)
 
 
-def _succeeds(here: CurvePoint, trial: CurvePoint, step: float) -> bool:
+def _succeeds(here: CurvePoint, trial: CurvePoint) -> bool:
     """Whether a point may be the next one: the curve is straight, the multipliers change little."""
-    calm = _change(here, trial) <= CALM
-    return bool(trial.tangent @ here.tangent >= SMOOTH and (calm or step <= FIRST_STEP))
+    length = np.linalg.norm(trial.place - here.place)
+    if not 0.0 < length <= 2.0 * LONGEST or trial.tangent @ here.tangent < SMOOTH:
+        return False
+    return bool(_change(here, trial) <= CALM or length <= FIRST_STEP)
 
 
 def _change(here: CurvePoint, trial: CurvePoint) -> float:

@@ -2,12 +2,12 @@
 
 import csv
 from abc import abstractmethod
-from collections.abc import Mapping
-from functools import cache, cached_property
+from collections.abc import Mapping, Sequence
+from functools import cache, cached_property, partial
 from io import StringIO
 from itertools import product
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.rules import GENERIC_RULES
 from gearchaos.configuration.tables import OF_CONTROLLERS, Parameter, swept_values
 from gearchaos.errors import GearchaosError
-from gearchaos.models.linear.machine import Actuator, Kinds, Machine
+from gearchaos.models.linear.machine import Actuator, Kinds, Machine, Parts
 from gearchaos.models.linear.rules import RULES
 from gearchaos.models.linear.tables import (
     MATRICES,
@@ -52,8 +52,30 @@ class MachineConfiguration(Configuration):
         """Names, orders and kinds that all lanes share."""
 
     @abstractmethod
+    def parts(self, values: Mapping[str, float]) -> Parts:
+        """Return the machine at any frequency, with these values of the other parameters."""
+
+    @abstractmethod
+    def frequency_at(self, values: Mapping[str, float]) -> float:
+        """Return the angular frequency of the excitation."""
+
+    rate: ClassVar[str]
+    """The parameter on which the frequency depends, and of the parts nothing else."""
+
     def machine(self, values: Mapping[str, float]) -> Machine:
         """Return the machine with these values of the swept parameters."""
+        others = {path: value for path, value in values.items() if path != self.rate}
+        chosen = tuple(others.items())
+        # Continuation needs the same machine at other frequencies at every step.
+        if self._last_parts.get("values") != chosen:
+            self._last_parts.update(values=chosen, parts=self.parts(others))
+        parts: Parts = self._last_parts["parts"]
+        return parts.machine(self.frequency_at(values))
+
+    @cached_property
+    def _last_parts(self) -> dict[str, Any]:
+        """The parts that were used last, with their values."""
+        return {}
 
     @abstractmethod
     def actuator_at(self, values: Mapping[str, float], name: str) -> Actuator:
@@ -149,22 +171,29 @@ class LinearConfiguration(MachineConfiguration):
                     found |= set(range(1, 1 + max(len(waves.cosine), len(waves.sine))))
         return tuple(sorted(found))
 
-    def machine(self, values: Mapping[str, float]) -> Machine:
-        """Return the machine with these values of the swept parameters."""
-        frequency = float(values.get("frequency", self.model.frequency))
-        given = {"clearance": self.clearance, "force": self.force}
-        swept = {path: value for path, value in values.items() if path != "frequency"}
-        tables = with_numbers(given, swept)
+    rate = "frequency"
+
+    def frequency_at(self, values: Mapping[str, float]) -> float:
+        """Return the angular frequency of the excitation."""
+        return float(values.get(self.rate, self.model.frequency))
+
+    def parts(self, values: Mapping[str, float]) -> Parts:
+        """Return the machine at any frequency, with these values of the other parameters."""
+        tables = with_numbers({"clearance": self.clearance, "force": self.force}, values)
         elements: list[Clearance] = [*tables["clearance"].values()]
-        return Machine(
+        forces: list[Force] = [*tables["force"].values()]
+        frequency = self.model.frequency
+        machine = Machine(
             frequency=frequency,
             **self._constant,
-            force=self._forces(tables["force"], frequency),
+            force=self._forces(forces, frequency),
             motion=self._waves([one.motion for one in elements]),
             contact_stiffness=self._waves([one.waves for one in elements]),
             contact_damping=np.array([one.damping for one in elements], dtype=np.float64),
             half_clearance=np.array([one.half_clearance for one in elements], dtype=np.float64),
         )
+        changes = any(one.times_frequency_squared for one in forces)
+        return Parts(machine, partial(self._forces, forces) if changes else None)
 
     @cached_property
     def _constant(self) -> dict[str, Floats]:
@@ -205,11 +234,11 @@ class LinearConfiguration(MachineConfiguration):
                         row[1 + 2 * orders.index(order) + part] = amplitude
         return waves
 
-    def _forces(self, given: Mapping[str, Force], frequency: float) -> Floats:
+    def _forces(self, given: Sequence[Force], frequency: float) -> Floats:
         """Return the forces on all coordinates, shape (n, w)."""
         orders = self.kinds_of_elements.orders
         forces = np.zeros((len(self.model.coordinates), 1 + 2 * len(orders)))
-        for one in given.values():
+        for one in given:
             at = 1 + 2 * orders.index(one.order)
             wave = np.zeros(forces.shape[1])
             wave[0], wave[at], wave[at + 1] = wave_of(one, frequency)

@@ -1,6 +1,6 @@
 """One piecewise-linear machine as matrices."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +54,26 @@ class Machine(NamedTuple):
         """K with all elements in contact at their mean stiffness, shape (n, n)."""
         held: Floats = self.stiffness + self.reaction @ (self.contact_stiffness[:, :1] * self.gap)
         return held
+
+
+class Parts(NamedTuple):
+    """A machine at any frequency.
+
+    Attributes
+    ----------
+    at_one : Machine
+        The machine at some frequency.
+    force : callable or None
+        Returns its force at a frequency, shape (n, w); None if that is always the same.
+    """
+
+    at_one: Machine
+    force: Callable[[float], Floats] | None = None
+
+    def machine(self, frequency: float) -> Machine:
+        """Return the machine at a frequency."""
+        force = self.at_one.force if self.force is None else self.force(frequency)
+        return self.at_one._replace(frequency=frequency, force=force)
 
 
 class Actuator(NamedTuple):

@@ -12,7 +12,7 @@ from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.rules import GENERIC_RULES, Rules
 from gearchaos.configuration.tables import OF_CONTROLLERS, Parameter
 from gearchaos.models.linear.configuration import MachineConfiguration, parameters_in
-from gearchaos.models.linear.machine import Actuator, Kinds, Machine, without_drift
+from gearchaos.models.linear.machine import Actuator, Kinds, Parts, without_drift
 from gearchaos.models.linear.rules import add_rules_of_machines
 from gearchaos.models.linear.values import with_numbers
 from gearchaos.models.stiffness_table import IN_N_PER_UM, with_stiffness_files
@@ -69,7 +69,7 @@ class TrainConfiguration(MachineConfiguration):
             yield "planetary.sun_mesh", self.planetary.sun_mesh
             yield "planetary.ring_mesh", self.planetary.ring_mesh
 
-    @property
+    @cached_property
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
         """The numbers that a sweep can vary, by their dotted path."""
         tables = {name: getattr(self, name) for name in PARTS}
@@ -103,13 +103,15 @@ class TrainConfiguration(MachineConfiguration):
         """Names, orders and kinds that all lanes share."""
         return self._assembled({}).kinds()
 
-    def machine(self, values: Mapping[str, float]) -> Machine:
-        """Return the machine with these values of the swept parameters."""
-        return self._assembled(values).machine(self._frequency(values))
+    rate = "operation.speed_rpm"
 
-    def _frequency(self, values: Mapping[str, float]) -> float:
+    def parts(self, values: Mapping[str, float]) -> Parts:
+        """Return the machine at any frequency, with these values of the other parameters."""
+        return Parts(self._assembled(values).machine(self.frequency_at(values)))
+
+    def frequency_at(self, values: Mapping[str, float]) -> float:
         """Return the angular frequency of the excitation in rad/ms."""
-        speed = values.get("operation.speed_rpm", self.operation.speed_rpm)
+        speed = values.get(self.rate, self.operation.speed_rpm)
         order = 1 if self.planetary is not None else self.orders()[next(iter(self.mesh))]
         return 2.0 * math.pi * self.mesh_rate() / order * speed / 60.0 * 1e-3
 
