@@ -43,6 +43,9 @@ ROUNDING = 1e-15
 NEAR_ENOUGH = 1e-5
 """Longest step of Newton's method after which the derivative by the parameter is used again."""
 
+UPRIGHT = 0.1
+"""Least component of a tangent by a parameter that stays fixed while a point is corrected."""
+
 CONTRACTION = 0.1
 """Largest ratio of successive distances with which the derivative is used again."""
 
@@ -75,6 +78,8 @@ class CurvePoint(NamedTuple):
     section : array, shape (periods, states)
         States at the ends of the excitation periods of the orbit, dimensionless; the last one is
         the state of the place.
+    by_share : array, shape (states,)
+        Derivative of the map over the period by the share of the way, in the scales.
     """
 
     place: Floats
@@ -84,6 +89,7 @@ class CurvePoint(NamedTuple):
     halfway: Floats
     impacts: tuple[int, ...]
     section: Floats
+    by_share: Floats
 
     @property
     def half_return(self) -> float:
@@ -151,6 +157,8 @@ class Curve(NamedTuple):
         Period in excitation periods.
     scale : array, shape (states,)
         Scales of the states.
+    own_maps : bool
+        Whether every share of the way has flow maps of its own.
     """
 
     systems_at: Callable[[Integers, Floats], LaneSystem]
@@ -158,6 +166,7 @@ class Curve(NamedTuple):
     plan: Plan
     periods: int
     scale: Floats
+    own_maps: bool = False
 
     def through(self, point: Floats, share: float) -> Self:
         """Return the curve with the scales of the orbit with state ``point`` at a share of it."""
@@ -179,10 +188,32 @@ class Curve(NamedTuple):
         largest = float(np.max(np.abs(place[:-1] * self.scale)))
         return float(np.max(np.abs(defect * self.scale))) <= ROUNDING_OF_STATES * largest
 
-    def correcting(self, guess: Floats, direction: Floats) -> "Finding[CurvePoint | None]":
-        """Return the search of `corrected`."""
+    def plane(self, direction: Floats, *tangents: Floats) -> Floats:
+        """Return the normal (states + 1,) of the plane in which a point of the curve is searched.
+
+        ``direction`` is that of the curve, ``tangents`` are those nearby. Where every share has
+        flow maps of its own, the share stays fixed, unless the curve is nearly normal to it. All
+        steps of Newton's method then have the same maps.
+        """
+        along = np.array([direction[-1], *(one[-1] for one in tangents)])
+        if not self.own_maps or np.min(along * np.sign(along[0])) < UPRIGHT:
+            return direction
+        return along_the_way(direction.size - 1)
+
+    def correcting(
+        self,
+        guess: Floats,
+        direction: Floats,
+        normal: Floats | None = None,
+        by_share: Floats | None = None,
+    ) -> "Finding[CurvePoint | None]":
+        """Return the search of `corrected`.
+
+        ``normal`` (states + 1,): that of the plane, by default ``direction``; ``by_share``
+        (states,): derivative of the map by the share near the guess, if it is known.
+        """
+        normal = direction if normal is None else normal
         place, last = guess, np.inf
-        by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
             ((defect, slopes, passed),) = yield [Request(self, place, by_share)]
             size = float(np.max(np.abs(defect)))
@@ -201,7 +232,7 @@ class Curve(NamedTuple):
                 last, by_share = np.inf, None
                 continue
             try:
-                bordered = np.vstack([slopes, direction])
+                bordered = np.vstack([slopes, normal])
                 step = np.linalg.solve(bordered, np.append(defect, 0.0))
             except np.linalg.LinAlgError:
                 break
@@ -248,8 +279,8 @@ class Curve(NamedTuple):
             halfway = passed.section[0, self.periods // 2 - 1] / self.scale - place[:-1]
         impacts = tuple(passed.contact[0, :, [1, 3]].T.astype(int).ravel().tolist())
         multipliers = multipliers[order].astype(np.complex128)
-        section = passed.section[0]
-        return CurvePoint(place, tangent, multipliers, size, halfway, impacts, section)
+        section, by_share = passed.section[0], slopes[:, -1]
+        return CurvePoint(place, tangent, multipliers, size, halfway, impacts, section, by_share)
 
 
 class Request(NamedTuple):
@@ -402,6 +433,17 @@ def extended(last: Sequence[OnCurve], step: float) -> Floats:
     square = (2.0 * here.tangent + old - 3.0 * slope) / length
     cube = (here.tangent + old - 2.0 * slope) / length**2
     return np.asarray(ahead + step**2 * square + step**3 * cube)
+
+
+def cubic(one: OnCurve, other: OnCurve, share: Floats) -> Floats:
+    """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
+    length = np.linalg.norm(other.place - one.place)
+    t = share[:, np.newaxis]
+    return np.asarray(
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * one.place
+        + t**2 * (3.0 - 2.0 * t) * other.place
+        + length * t * (1.0 - t) * ((1.0 - t) * one.tangent - t * other.tangent)
+    )
 
 
 def _at_share(

@@ -4,10 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan
+from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
+
+PLACES = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+"""Shares of the way at which the method is looked at."""
 
 
 class BranchRange(NamedTuple):
@@ -43,7 +46,12 @@ class BranchRange(NamedTuple):
 
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
-        whole = period * self.system_at(np.zeros(1)).repeats_after
         steps, method = plan.steps_per_period, plan.method
+        own_maps = np.unique(METHODS[method].sharing(self.system_at(PLACES))).size > 1
+        if own_maps:
+            # Maps are made once if the plan has as many steps as their series usually need.
+            taken = [steps_taken(self.system_at(share), plan) for share in PLACES[:, np.newaxis]]
+            steps = sorted(taken)[len(taken) // 2]
+        whole = period * self.system_at(np.zeros(1)).repeats_after
         plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
-        return Curve(self.systems_at, 0, plan, period, scale)
+        return Curve(self.systems_at, 0, plan, period, scale, own_maps)

@@ -26,6 +26,7 @@ from gearchaos.dynamics.arclength import (
     CurvePoint,
     Finding,
     along_the_way,
+    cubic,
     defects_of,
     extended,
 )
@@ -54,6 +55,9 @@ MOST_POINTS = 4000
 
 LOCATED = 1e-11
 """Largest length of the stretch of a curve in which a special point lies."""
+
+SHORT = 0.01
+"""Length of such a stretch in which the derivative by the parameter is nearly linear."""
 
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
@@ -186,13 +190,15 @@ class TracedBranch(NamedTuple):
 def _abreast(
     curve: Curve, one: Floats, other: Floats, target: Floats
 ) -> Finding[CurvePoint | None]:
-    """Search the point of a curve in the plane through a target, normal to a chord of the curve.
+    """Search the point of a curve in a plane through a target, next to a chord of the curve.
 
     All are places (states + 1,); the chord leads from ``one`` to ``other``.
     """
-    direction = (other - one) / np.linalg.norm(other - one)
-    guess = one + float((target - one) @ direction) * direction
-    return (yield from curve.correcting(guess, direction))
+    chord = other - one
+    direction = chord / np.linalg.norm(chord)
+    normal = curve.plane(direction)
+    guess = one + float((target - one) @ normal) / float(chord @ normal) * chord
+    return (yield from curve.correcting(guess, direction, normal))
 
 
 def trace(
@@ -318,7 +324,7 @@ def _next(
     here = last[-1]
     guess = extended(last, step)
     if 0.0 <= guess[-1] <= 1.0:
-        trial = yield from curve.correcting(guess, here.tangent)
+        trial = yield from curve.correcting(guess, here.tangent, curve.plane(here.tangent))
         if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
             return None, False
         if 0.0 <= trial.share <= 1.0:
@@ -461,15 +467,20 @@ def _located(
     has a sign. None if a point between them is not found.
     """
     low, high = function(one), function(other)
+    bisects = abs(low) == abs(high) == 1.0
     nearest = one
     for number in range(MOST_TRIALS):
         chord = other.place - one.place
         length = float(np.linalg.norm(chord))
         if length <= located:
             break
-        share = 0.5 if number % 3 == 2 or abs(low) == abs(high) else low / (low - high)
+        share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
         share = min(max(share, 1e-3), 1.0 - 1e-3)
-        middle = yield from curve.correcting(one.place + share * chord, chord / length)
+        guess, direction = cubic(one, other, np.array([share]))[0], chord / length
+        normal = curve.plane(direction, one.tangent, other.tangent)
+        by_share = one.by_share + share * (other.by_share - one.by_share)
+        known = by_share if curve.own_maps and length <= SHORT else None
+        middle = yield from curve.correcting(guess, direction, normal, known)
         if middle is None:
             return nearest if length < 1e-7 else None
         nearest, value = middle, function(middle)

@@ -330,6 +330,7 @@ def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[
         return {}
     whole = branch.curve.plan.recorded_periods
     plan = run.plan._replace(
+        steps_per_period=branch.curve.plan.steps_per_period,
         transient_periods=0,
         recorded_periods=whole,
         section_points=0,
