@@ -6,14 +6,15 @@ therefore found on both sides of +1, however fast it changes with the parameter.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, Self, TypeAlias
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
+from gearchaos.dynamics.curve_defects import Defect, Finding, Request, defects_of
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS, ROUNDING_OF_STATES
-from gearchaos.dynamics.side_by_side import Found, Search, run
+from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 FIRST_STEP, LONGEST_CURVE_STEP, SHORTEST_STEP = 1e-3, 0.05, 1e-10
@@ -34,14 +35,14 @@ APART = 1e-6
 NEAR_ON_CURVE = 1e-4
 """Largest distance along the curve between both sides of a located end."""
 
-DIFFERENCE = 1e-8
-"""Share of the way used for the difference quotient of the map by the parameter."""
-
 ROUNDING = 1e-15
 """Return distance that rounding leaves, relative to the largest entry of the Jacobian."""
 
 NEAR_ENOUGH = 1e-5
 """Longest step of Newton's method after which the derivative by the parameter is used again."""
+
+UPRIGHT = 0.1
+"""Least component of a tangent by a parameter that stays fixed while a point is corrected."""
 
 CONTRACTION = 0.1
 """Largest ratio of successive distances with which the derivative is used again."""
@@ -75,6 +76,8 @@ class CurvePoint(NamedTuple):
     section : array, shape (periods, states)
         States at the ends of the excitation periods of the orbit, dimensionless; the last one is
         the state of the place.
+    by_share : array, shape (states,)
+        Derivative of the map over the period by the share of the way, in the scales.
     """
 
     place: Floats
@@ -84,6 +87,7 @@ class CurvePoint(NamedTuple):
     halfway: Floats
     impacts: tuple[int, ...]
     section: Floats
+    by_share: Floats
 
     @property
     def half_return(self) -> float:
@@ -185,43 +189,65 @@ class Curve(NamedTuple):
         largest = float(np.max(np.abs(place[:-1] * self.scale)))
         return float(np.max(np.abs(defect * self.scale))) <= ROUNDING_OF_STATES * largest
 
+    def plane(self, direction: Floats, *tangents: Floats) -> Floats:
+        """Return the normal (states + 1,) of the plane in which a point of the curve is searched.
+
+        ``direction`` is that of the curve, ``tangents`` are those nearby. Where every share has
+        flow maps of its own, the share stays fixed, unless the curve is nearly normal to it. All
+        steps of Newton's method then have the same maps.
+        """
+        along = np.array([direction[-1], *(one[-1] for one in tangents)])
+        if not self.own_maps or np.min(along * np.sign(along[0])) < UPRIGHT:
+            return direction
+        return along_the_way(direction.size - 1)
+
     def correcting(
-        self, guess: Floats, direction: Floats, reach: float = np.inf
-    ) -> "Finding[CurvePoint | None]":
-        """Return the search of `corrected`; None also where it leads farther away than a reach."""
+        self,
+        guess: Floats,
+        direction: Floats,
+        normal: Floats | None = None,
+        by_share: Floats | None = None,
+        reach: float = np.inf,
+    ) -> Finding["CurvePoint | None"]:
+        """Return the search of `corrected`; None also where it leads farther away than a reach.
+
+        ``normal`` (states + 1,): that of the plane, by default ``direction``; ``by_share``
+        (states,): derivative of the map by the share near the guess, if it is known.
+        """
+        normal = direction if normal is None else normal
         place, last = guess, np.inf
-        by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
-            ((defect, slopes, passed),) = yield [Request(self, place, by_share)]
-            size = float(np.max(np.abs(defect)))
-            # Rounding of the state grows with the largest multiplier.
-            closed = size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes))))
+            (defect,) = yield [Request(self, place, normal, by_share)]
             # The size is also NaN where the motion diverged.
-            stalled = not size < 0.5 * last
-            if closed or (stalled and self._closed_to_rounding(place, defect)):
-                if not np.isfinite(slopes).all():
+            stalled = not defect.size < 0.5 * last
+            if self._closed(place, defect, stalled):
+                if not (np.isfinite(defect.slopes).all() and np.isfinite(defect.along).all()):
                     break
-                return self._point(place, slopes, direction, size, passed)
+                return self._point(place, defect, direction)
             if stalled:
                 if by_share is None:
                     break
                 # An old derivative is not enough where the equations are nearly singular.
                 last, by_share = np.inf, None
                 continue
-            try:
-                bordered = np.vstack([slopes, direction])
-                step = np.linalg.solve(bordered, np.append(defect, 0.0))
-            except np.linalg.LinAlgError:
-                break
             # After a short step the derivative by the parameter has changed little. To compute it
-            # costs as much as the orbit if the parameter changes the flow maps.
-            short = (
-                self.own_maps and np.linalg.norm(step) <= NEAR_ENOUGH and size < CONTRACTION * last
-            )
-            place, last, by_share = place - step, size, slopes[:, -1] if short else None
-            if np.linalg.norm(place - guess) > reach:
+            # takes another map if the parameter changes the flow maps.
+            near = np.linalg.norm(defect.step) <= NEAR_ENOUGH and defect.size < CONTRACTION * last
+            by_share = defect.slopes[:, -1] if self.own_maps and near else None
+            place, last = place - defect.step, defect.size
+            # The step is NaN where the equations are singular.
+            if not np.linalg.norm(place - guess) <= reach:
                 break
         return None
+
+    def _closed(self, place: Floats, defect: Defect, stalled: bool) -> bool:
+        """Whether an orbit is closed, up to rounding if Newton's method makes no progress."""
+        if defect.size <= CLOSED:
+            return True
+        # Rounding of the state grows with the largest multiplier.
+        if defect.size <= ROUNDING * float(np.max(np.abs(defect.slopes))):
+            return True
+        return stalled and self._closed_to_rounding(place, defect.distance)
 
     def doubled(self) -> Self:
         """Return the curve of orbits of twice the period, with the same scales."""
@@ -229,117 +255,32 @@ class Curve(NamedTuple):
         plan = self.plan._replace(recorded_periods=whole, section_points=whole)
         return self._replace(periods=2 * self.periods, plan=plan)
 
-    def jacobian(self, place: Floats) -> "Finding[Floats]":
+    def jacobian(self, place: Floats) -> Finding[Floats]:
         """Search the Jacobian of the map over the period, in the scales, (states, states)."""
         states = self.scale.size
-        (defect,) = yield [Request(self, place, np.zeros(states))]
+        (defect,) = yield [Request(self, place, along_the_way(states), np.zeros(states))]
         return defect.slopes[:, :-1] + np.eye(states)
 
-    def defect_of(self, request: "Request", passed: Outcome) -> "Defect":
-        """Return the defect at a place, from the motion of its lanes."""
-        states, by_share = self.scale.size, request.by_share
-        ends = passed.section[:, -1] / self.scale
-        columns = passed.end_tangent * np.exp(np.sum(passed.growth, axis=1))[:, np.newaxis]
-        jacobian = columns[:states].T * self.scale / self.scale[:, np.newaxis]
-        if by_share is None:
-            share, beside = request.shares()
-            by_share = (ends[-1] - ends[0]) / (beside - share)
-        slopes = np.column_stack([jacobian - np.eye(states), by_share])
-        return Defect(ends[0] - request.place[:-1], slopes, passed)
-
-    def _point(
-        self, place: Floats, slopes: Floats, direction: Floats, size: float, passed: Outcome
-    ) -> CurvePoint:
-        """Return the point of the curve at a place where the orbit is closed to a distance."""
-        tangent = np.linalg.svd(slopes)[2][-1]
+    def _point(self, place: Floats, defect: Defect, direction: Floats) -> CurvePoint:
+        """Return the point of the curve at a place with a closed orbit."""
+        slopes, section = defect.slopes, defect.section
+        tangent = defect.along / np.linalg.norm(defect.along)
         tangent = tangent * np.sign(tangent @ direction)
         multipliers = np.linalg.eigvals(slopes[:, :-1] + np.eye(self.scale.size))
         order = np.argsort(-np.abs(multipliers), kind="stable")
         halfway = np.zeros(0)
         if self.periods % 2 == 0:
-            halfway = passed.section[0, self.periods // 2 - 1] / self.scale - place[:-1]
-        impacts = tuple(passed.contact[0, :, [1, 3]].T.astype(int).ravel().tolist())
-        multipliers = multipliers[order].astype(np.complex128)
-        section = passed.section[0]
-        return CurvePoint(place, tangent, multipliers, size, halfway, impacts, section)
-
-
-class Request(NamedTuple):
-    """A place of a curve whose defect is needed.
-
-    Attributes
-    ----------
-    curve : Curve
-        The curve.
-    place : array, shape (states + 1,)
-        The state in its scales, then the share of the way.
-    by_share : array, shape (states,), or None
-        The derivative of the map by the share of the way, if it is known.
-    """
-
-    curve: Curve
-    place: Floats
-    by_share: Floats | None = None
-
-    def shares(self) -> list[float]:
-        """Return the share of the place, and one beside it if the derivative is unknown."""
-        # Beyond the ends of the way the value of the parameter may be invalid.
-        share = min(max(float(self.place[-1]), 0.0), 1.0)
-        beside = share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)
-        return [share] if self.by_share is not None else [share, beside]
-
-
-class Defect(NamedTuple):
-    """How far an orbit is from being closed.
-
-    Attributes
-    ----------
-    distance : array, shape (states,)
-        P(x) - x in the scales; P is the map over the period.
-    slopes : array, shape (states, states + 1)
-        Its derivatives by the place.
-    passed : Outcome
-        The motion of the lanes of the place, with one section point per excitation period.
-    """
-
-    distance: Floats
-    slopes: Floats
-    passed: Outcome
-
-
-Finding: TypeAlias = Search[Request, Defect, Found]
-"""Yields places of curves, is sent their defects, and returns the result."""
-
-
-def defects_of(requests: Sequence[Request]) -> list[Defect]:
-    """Return the defects at places of curves, one each, from one integration.
-
-    The curves differ in their numbers, periods and scales only.
-    """
-    first = requests[0].curve
-    states = first.scale.size
-    shares = [request.shares() for request in requests]
-    known = np.array([len(one) for one in shares])
-    numbers = np.repeat([request.curve.number for request in requests], known)
-    system = first.systems_at(numbers, np.concatenate(shares))
-    # One lane for each column of the Jacobian, and one for the difference by the parameter.
-    copies = np.concatenate([[states, 1][:count] for count in known])
-    lanes, counts = system.of(np.repeat(np.arange(copies.size), copies)), states + known - 1
-    points = [request.place[:-1] * request.curve.scale for request in requests]
-    tangents = np.concatenate([np.eye(states)[[*range(states), 0]][:count] for count in counts])
-    periods = np.array([request.curve.plan.recorded_periods for request in requests])
-    longest = int(periods.max())
-    plan = first.plan._replace(recorded_periods=longest, section_points=longest)
-    start, own = np.repeat(points, counts, axis=0), np.repeat(periods, counts)
-    passed = integrate(lanes, start, plan, tangent_start=tangents, periods=own)
-    found, at = [], 0
-    for request, whole, count in zip(requests, periods, counts, strict=True):
-        parts: Any = (array[at : at + count] for array in passed)
-        one = Outcome(*parts)
-        one = one._replace(section=one.section[:, -whole:], growth=one.growth[:, :whole])
-        found.append(request.curve.defect_of(request, one.every(system.repeats_after)))
-        at += count
-    return found
+            halfway = section[self.periods // 2 - 1] / self.scale - place[:-1]
+        return CurvePoint(
+            place,
+            tangent,
+            multipliers[order].astype(np.complex128),
+            defect.size,
+            halfway,
+            tuple(defect.contact[:, [1, 3]].astype(int).ravel().tolist()),
+            section,
+            slopes[:, -1],
+        )
 
 
 def end_of_curve(
@@ -429,6 +370,17 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
     tangents = here.tangent + 2.0 * step * square + 3.0 * step**2 * cube
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     return ahead + step**2 * square + step**3 * cube, tangents
+
+
+def cubic(one: OnCurve, other: OnCurve, share: Floats) -> Floats:
+    """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
+    length = np.linalg.norm(other.place - one.place)
+    t = share[:, np.newaxis]
+    return np.asarray(
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * one.place
+        + t**2 * (3.0 - 2.0 * t) * other.place
+        + length * t * (1.0 - t) * ((1.0 - t) * one.tangent - t * other.tangent)
+    )
 
 
 def _at_share(

@@ -10,13 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.arclength import CurvePoint
+from gearchaos.dynamics.arclength import CurvePoint, cubic
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
 from gearchaos.dynamics.boundary_following import (
     SHORT_STEP,
     Path,
     among_columns,
-    cubic,
     fixed_direction,
     following,
 )

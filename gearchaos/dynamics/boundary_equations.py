@@ -12,7 +12,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate
 
 from gearchaos.arrays import Complex, Floats, Mask
-from gearchaos.dynamics.arclength import DIFFERENCE, ROUNDING
+from gearchaos.dynamics.arclength import ROUNDING
 from gearchaos.dynamics.boundary_passages import (
     PARAMETERS,
     Following,
@@ -21,6 +21,7 @@ from gearchaos.dynamics.boundary_passages import (
     nearest_extremes,
     passed_of,
 )
+from gearchaos.dynamics.curve_defects import DIFFERENCE
 from gearchaos.dynamics.orbits import CLOSED
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBLING

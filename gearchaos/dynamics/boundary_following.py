@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.dynamics.arclength import extended
+from gearchaos.dynamics.arclength import cubic, extended
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
@@ -246,14 +246,3 @@ def _at_edge(
         return None
     onward = np.sign(trial.tangent @ here.tangent) or 1.0
     return trial._replace(tangent=onward * trial.tangent)
-
-
-def cubic(one: OnBoundary, other: OnBoundary, share: Floats) -> Floats:
-    """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
-    length = np.linalg.norm(other.place - one.place)
-    t = share[:, np.newaxis]
-    return np.asarray(
-        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * one.place
-        + t**2 * (3.0 - 2.0 * t) * other.place
-        + length * t * (1.0 - t) * ((1.0 - t) * one.tangent - t * other.tangent)
-    )

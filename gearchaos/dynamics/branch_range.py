@@ -4,8 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan
-from gearchaos_kernels.methods.registry import METHODS
+from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
@@ -15,6 +14,9 @@ LANES_AHEAD, MOST_AHEAD = 64, 4
 
 WITH_OWN_MAPS = 2
 """Number of points ahead where each has flow maps of its own, which cost more than their lanes."""
+
+PLACES = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+"""Shares of the way at which the method is looked at."""
 
 
 class BranchRange(NamedTuple):
@@ -50,11 +52,14 @@ class BranchRange(NamedTuple):
 
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
-        amid = self.system_at(np.array([0.25, 0.75]))
-        own_maps = bool(np.ptp(METHODS[plan.method].sharing(amid)))
-        ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
-        whole = period * amid.repeats_after
         steps, method = plan.steps_per_period, plan.method
+        own_maps = np.unique(METHODS[method].sharing(self.system_at(PLACES))).size > 1
+        if own_maps:
+            # Maps are made once if the plan has as many steps as their series usually need.
+            taken = [steps_taken(self.system_at(share), plan) for share in PLACES[:, np.newaxis]]
+            steps = sorted(taken)[len(taken) // 2]
+        ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
+        whole = period * self.system_at(np.zeros(1)).repeats_after
         plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
         ahead = min(max(ahead, 1), MOST_AHEAD)
         return Curve(self.systems_at, 0, plan, period, scale, ahead, own_maps)

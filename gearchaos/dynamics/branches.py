@@ -24,11 +24,11 @@ from gearchaos.dynamics.arclength import (
     SHORTEST_STEP,
     Curve,
     CurvePoint,
-    Finding,
     along_the_way,
-    defects_of,
+    cubic,
     extended,
 )
+from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -54,6 +54,9 @@ MOST_POINTS = 4000
 
 LOCATED = 1e-11
 """Largest length of the stretch of a curve in which a special point lies."""
+
+SHORT = 0.01
+"""Length of such a stretch in which the derivative by the parameter is nearly linear."""
 
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
@@ -192,13 +195,15 @@ class TracedBranch(NamedTuple):
 def _abreast(
     curve: Curve, one: Floats, other: Floats, target: Floats
 ) -> Finding[CurvePoint | None]:
-    """Search the point of a curve in the plane through a target, normal to a chord of the curve.
+    """Search the point of a curve in a plane through a target, next to a chord of the curve.
 
     All are places (states + 1,); the chord leads from ``one`` to ``other``.
     """
-    direction = (other - one) / np.linalg.norm(other - one)
-    guess = one + float((target - one) @ direction) * direction
-    return (yield from curve.correcting(guess, direction))
+    chord = other - one
+    direction = chord / np.linalg.norm(chord)
+    normal = curve.plane(direction)
+    guess = one + float((target - one) @ normal) / float(chord @ normal) * chord
+    return (yield from curve.correcting(guess, direction, normal))
 
 
 def trace(
@@ -369,7 +374,12 @@ def _next(
     inside = (guesses[:, -1] >= 0.0) & (guesses[:, -1] <= 1.0)
     within = distances.size if inside.all() else int(np.argmin(inside))
     reaches = ASIDE * np.diff(distances, prepend=0.0)
-    searches = [curve.correcting(guesses[at], directions[at], reaches[at]) for at in range(within)]
+    searches = [
+        curve.correcting(guess, direction, curve.plane(here.tangent, direction), reach=reach)
+        for guess, direction, reach in zip(
+            guesses[:within], directions[:within], reaches[:within], strict=True
+        )
+    ]
     leaves = within < distances.size
     if leaves:
         searches.append(_at_edge(curve, here, guesses[within], distances[within]))
@@ -528,15 +538,20 @@ def _located(
     has a sign. None if a point between them is not found.
     """
     low, high = function(one), function(other)
+    bisects = abs(low) == abs(high) == 1.0
     nearest = one
     for number in range(MOST_TRIALS):
         chord = other.place - one.place
         length = float(np.linalg.norm(chord))
         if length <= located:
             break
-        share = 0.5 if number % 3 == 2 or abs(low) == abs(high) else low / (low - high)
+        share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
         share = min(max(share, 1e-3), 1.0 - 1e-3)
-        middle = yield from curve.correcting(one.place + share * chord, chord / length)
+        guess, direction = cubic(one, other, np.array([share]))[0], chord / length
+        normal = curve.plane(direction, one.tangent, other.tangent)
+        by_share = one.by_share + share * (other.by_share - one.by_share)
+        known = by_share if curve.own_maps and length <= SHORT else None
+        middle = yield from curve.correcting(guess, direction, normal, known)
         if middle is None:
             return nearest if length < 1e-7 else None
         nearest, value = middle, function(middle)

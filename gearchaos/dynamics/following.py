@@ -12,7 +12,8 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Integers, Mask
-from gearchaos.dynamics.arclength import Curve, End, defects_of, end_of_curve
+from gearchaos.dynamics.arclength import Curve, End, end_of_curve
+from gearchaos.dynamics.curve_defects import defects_of
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability

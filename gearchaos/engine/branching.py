@@ -8,7 +8,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Floats
-from gearchaos.dynamics.arclength import Curve, CurvePoint, Finding, along_the_way, defects_of
+from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import (
     LOCATED,
@@ -18,6 +18,7 @@ from gearchaos.dynamics.branches import (
     doubled_start,
     tracing,
 )
+from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.provenance import provenance
@@ -330,6 +331,7 @@ def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[
         return {}
     whole = branch.curve.plan.recorded_periods
     plan = run.plan._replace(
+        steps_per_period=branch.curve.plan.steps_per_period,
         transient_periods=0,
         recorded_periods=whole,
         section_points=0,

@@ -9,6 +9,7 @@ Other models build on its functions.
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -39,16 +40,19 @@ def sine_and_cosine(angle: Floats) -> Floats:
     return np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
 
+@lru_cache(maxsize=32)
 def harmonic_series(order: int, steps: int, terms: int, amplitude: complex = 1.0) -> np.ndarray:
     """Return complex Taylor coefficients of amplitude exp(i order phase), shape (terms, steps).
 
-    They are about the middle of every step, in a variable that is -1 and 1 at the step's ends.
+    They are about the middle of every step, in a variable that is -1 and 1 at the step's ends. They
+    are kept, because maps of many lanes need them, and cannot be written to.
     """
     half = np.pi / steps
     middle = (2 * np.arange(steps) + 1) * half
     term = np.arange(terms)[:, np.newaxis]
     factor = half**term / np.cumprod(np.maximum(term, 1.0))[:, np.newaxis]
     series: np.ndarray = amplitude * np.exp(1j * order * middle) * (1j * order) ** term * factor
+    series.flags.writeable = False
     return series
 
 
