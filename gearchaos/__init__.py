@@ -24,9 +24,9 @@ if (
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # No plugin changes a configuration; to look for them reads the facts of all packages.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # What imports make is no garbage. With the usual threshold it is searched several times.
+    # Imports make no garbage. With the usual threshold Python searches for it several times.
     gc.set_threshold(100_000, 50, 100)
-    # Nor is it worth a search at the end, which would take a quarter of a short command.
+    # A search at the end of the process would take a quarter of a short command.
     atexit.register(gc.freeze)
 
 from typing import Any
