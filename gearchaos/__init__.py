@@ -7,6 +7,8 @@
 (1501,)
 """
 
+import atexit
+import gc
 import os
 import signal
 import sys
@@ -20,6 +22,12 @@ if (
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     # Commands multiply no large matrices; waiting threads of NumPy would only take time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # No plugin changes a configuration; to look for them reads the facts of all packages.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # Imports make no garbage. With the usual threshold Python searches for it several times.
+    gc.set_threshold(100_000, 50, 100)
+    # A search at the end of the process would take a quarter of a short command.
+    atexit.register(gc.freeze)
 
 from typing import Any
 

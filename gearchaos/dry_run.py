@@ -20,7 +20,6 @@ from tqdm import tqdm
 from gearchaos.arrays import Integers
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.computing import block_lanes, block_memory, integrate_places
-from gearchaos.engine.control import described
 from gearchaos.engine.kept import arrays_of, variables_of
 from gearchaos.engine.resonances import resonances
 from gearchaos.engine.run_plan import RunPlan
@@ -123,7 +122,7 @@ def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
     of_all = "" if estimate.lanes == estimate.every else f" of {estimate.every}"
     threads = f"{estimate.threads} thread{'s' if estimate.threads > 1 else ''}"
     controllers = lanes.controllers
-    controlled = {"control": described(run, controllers.orbits)} if controllers else {}
+    controlled = {"control": controllers.described()} if controllers else {}
     return {
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",

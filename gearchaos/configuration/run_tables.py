@@ -89,8 +89,12 @@ class Control(Table, Generic[State]):
     gain: Literal["lqr", "placement", "delayed"] = key(default="lqr")
     """linear-quadratic gain; placement of the unstable multipliers at 0; or the linear-quadratic
     gain times the difference from the state one orbit earlier"""
-    state_weight: float = key(units="1", default=1.0, ge=0)
-    """weight of the squared deviation in the cost of a linear-quadratic gain"""
+    state_weight: float = key(
+        "weight of the squared deviation in the cost of a linear-quadratic gain",
+        units="1",
+        default=1.0,
+        ge=0,
+    )
     input_weight: float = key("weight of the squared input in the cost", "1", default=10.0, gt=0)
     gain_factor: float = key("factor of the gain", "1", default=1.0)
     limit: float | None = key(
@@ -103,8 +107,11 @@ class Control(Table, Generic[State]):
     limit_Nm: float | None = key(
         "largest change of the torque", "N m", example=5.0, default=None, ge=0
     )
-    limit_force: float | None = key(default=None, ge=0)
-    """largest change of the force of a linear machine, in the units of its forces"""
+    limit_force: float | None = key(
+        "largest change of the force of a linear machine, in the units of its forces",
+        default=None,
+        ge=0,
+    )
     measured: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
         "states that are measured, the others are estimated; by default all are known",
         example=["delta_5", "delta_5_rate"],

@@ -1,6 +1,7 @@
-"""Transient and steps of a run, chosen by trials before the run."""
+"""Transient, steps and controllers of a run, chosen before the run."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from gearchaos.configuration.methods import METHODS
 from gearchaos.engine.run_plan import Chosen, RunPlan
@@ -75,3 +76,19 @@ def _texts(
             f"{exponent}, wanted is {tolerance:g}; "
             f"{tried.changed_share * lanes:.0f} settle on a different motion with finer steps"
         )
+
+
+def with_controllers(run: RunPlan) -> RunPlan:
+    """Return a run whose lanes have the controllers of its [control], with a note about them.
+
+    Steps have to be chosen before: an orbit belongs to a number of steps. Raises ConfigurationError
+    if no orbit is found, or if it cannot be controlled where it was found.
+    """
+    if run.config.control is None:
+        return run
+    # SciPy, which designs gains, takes as long to import as Numba.
+    from gearchaos.engine.control import Controllers
+
+    controllers = Controllers(run)
+    controlled = replace(run, lanes=run.lanes.controlled_by(controllers))
+    return controlled.with_notes(f"control: {controllers.described()}")

@@ -1,7 +1,6 @@
 """The controllers of the lanes of a run, and what a result says of them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import gearchaos_kernels as kernels
 import numpy as np
@@ -11,7 +10,7 @@ from gearchaos.arrays import Codes, Floats, Integers
 from gearchaos.dynamics.control import require_controllable
 from gearchaos.dynamics.controllers import ControlSettings, Designed, Target, control_of
 from gearchaos.engine.run_plan import RunPlan
-from gearchaos.engine.target_orbits import TargetOrbits, machine_at, target_orbits
+from gearchaos.engine.target_orbits import machine_at, target_orbits
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.control import NO_GAIN, NO_ORBIT, NOT_CAPTURED, OFF
 
@@ -71,6 +70,24 @@ class Controllers:
         run = self._run
         unit = run.lanes.model.input_unit(run.config, values)
         return None if unit is None else np.broadcast_to(unit, lanes.shape)
+
+    def described(self) -> str:
+        """Return what is controlled, in words."""
+        config, control, orbits = self._run.config, self._control, self.orbits
+        absolute = config.absolute_limit
+        value = getattr(control, absolute)
+        if not {"control.limit", f"control.{absolute}"}.isdisjoint(config.swept):
+            limit = "within the swept limits"
+        elif value is None:
+            limit = f"within {100.0 * (control.limit or 0.0):g} % of it"
+        else:
+            limit = f"within {value:g}{' N m' if absolute == 'limit_Nm' else ''}"
+        actuator = config.actuator_of(control.actuator)
+        along = f" for {orbits.exists} of {orbits.values.size} values" if orbits.parameter else ""
+        return (
+            f"{actuator} {limit}, {control.gain}, period-{control.period} orbit found"
+            f"{orbits.place}{along}, from mesh period {control.begins} on"
+        )
 
     def _setting(self, name: str, lanes: Integers, values: Mapping[str, Floats]) -> Floats:
         """Return the value of a key of [control] in every lane, (lanes,)."""
@@ -144,40 +161,6 @@ class Controllers:
             return Designed(target, target.gain(settings), settings), NOT_CAPTURED
         except (ConfigurationError, np.linalg.LinAlgError):
             return nothing, NO_GAIN
-
-
-def with_controllers(run: RunPlan) -> RunPlan:
-    """Return a run whose lanes have the controllers of its [control], with a note about them.
-
-    Steps have to be chosen before: an orbit belongs to a number of steps. Raises ConfigurationError
-    if no orbit is found, or if it cannot be controlled where it was found.
-    """
-    if run.config.control is None:
-        return run
-    controllers = Controllers(run)
-    return replace(run, lanes=run.lanes.controlled_by(controllers)).with_notes(
-        f"control: {described(run, controllers.orbits)}"
-    )
-
-
-def described(run: RunPlan, orbits: TargetOrbits) -> str:
-    """Return what is controlled, in words."""
-    control = run.config.control
-    assert control is not None
-    absolute = run.config.absolute_limit
-    value = getattr(control, absolute)
-    if not {"control.limit", f"control.{absolute}"}.isdisjoint(run.config.swept):
-        limit = "within the swept limits"
-    elif value is None:
-        limit = f"within {100.0 * (control.limit or 0.0):g} % of it"
-    else:
-        limit = f"within {value:g}{' N m' if absolute == 'limit_Nm' else ''}"
-    actuator = run.config.actuator_of(control.actuator)
-    along = f" for {orbits.exists} of {orbits.values.size} values" if orbits.parameter else ""
-    return (
-        f"{actuator} {limit}, {control.gain}, period-{control.period} orbit found"
-        f"{orbits.place}{along}, from mesh period {control.begins} on"
-    )
 
 
 def _seeds(seed: int, lanes: Integers) -> NDArray[np.uint64]:

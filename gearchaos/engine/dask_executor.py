@@ -17,8 +17,8 @@ import numba
 from dask.utils import parse_timedelta
 
 from gearchaos.arrays import Arrays
+from gearchaos.engine.choosing import with_controllers
 from gearchaos.engine.computing import Bounds, EndStates, compute_block
-from gearchaos.engine.control import with_controllers
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.errors import ConfigurationError, ExecutionError

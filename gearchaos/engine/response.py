@@ -8,9 +8,8 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
 from gearchaos.configuration.methods import METHODS
-from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.choosing import with_chosen_steps, with_controllers
 from gearchaos.engine.computing import integrate_places
-from gearchaos.engine.control import with_controllers
 from gearchaos.engine.excitation import whole_lengths
 from gearchaos.engine.kept import arrays_of
 from gearchaos.engine.lanes import Lanes

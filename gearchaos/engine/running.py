@@ -15,9 +15,8 @@ from gearchaos_kernels.compilation import on_compilation
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Arrays
 from gearchaos.configuration.methods import METHODS
-from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.choosing import with_chosen_steps, with_controllers
 from gearchaos.engine.computing import Bounds, block_lanes, block_memory, blocks, rehearse
-from gearchaos.engine.control import with_controllers
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.kept import variables_of

@@ -86,7 +86,7 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
     # Starts, realisations and directions of one value have the same stability.
     every = np.arange(0, len(lanes), lanes.repeats)
     parts = np.split(every, range(LANES_AT_ONCE, every.size, LANES_AT_ONCE))
-    needed = [stability.fewest_stable_steps(lanes.system_of(part)) for part in parts]
+    needed = [_fewest_stable_steps(lanes.system_of(part)) for part in parts]
     fewest = np.concatenate(needed)
     limit = int(fewest.max())
     steps = _doubled(DEFAULT_STEPS, limit) if given is None else given
@@ -108,6 +108,17 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
         f"integration.steps_per_period raised from {steps} to {limit}, the stability limit "
         f"of {unstable.size * lanes.repeats} of {len(lanes)} lanes"
     )
+
+
+def _fewest_stable_steps(system: LaneSystem) -> Integers:
+    """Return the smallest stable number of steps of every lane, (lanes,).
+
+    Where only the excitation differs, such as its amplitude, all lanes have the modes of the first.
+    """
+    stiffnesses, numbers = system.branch_stiffnesses(), system.map_parameters()
+    alike = (numbers == numbers[:1]).all() and (stiffnesses == stiffnesses[:, :1]).all()
+    fewest = stability.fewest_stable_steps(system.of([0]) if alike else system)
+    return np.broadcast_to(fewest, system.lanes)
 
 
 def _doubled(steps: int, limit: int) -> int:

@@ -8,6 +8,7 @@ signature has its own file, which begins with a checksum of its name and content
 import atexit
 import functools
 import hashlib
+import io
 import logging
 import os
 import pickle
@@ -26,11 +27,12 @@ from numba import config
 try:
     from numba.core.caching import NullCache
     from numba.core.compiler import CompileResult
+    from numba.core.environment import Environment, lookup_environment
     from numba.core.runtime import rtsys
     from numba.core.serialize import dumps
 except ImportError:
     NullCache = object
-    CompileResult = dumps = rtsys = None
+    CompileResult = Environment = dumps = lookup_environment = rtsys = None
 try:
     from numba.misc.appdirs import user_cache_dir
 except ImportError:
@@ -92,6 +94,8 @@ def keep_compiled(dispatcher: Any, folder: Path) -> None:
         _warn_unfit("it has another cache")
     else:
         dispatcher._cache = KernelCache(dispatcher.py_func, folder)
+        # Kernels need no extensions of Numba, and to look for them reads the facts of all packages.
+        dispatcher._compilation_chain_init_hook = lambda: None
 
 
 def _warn_unfit(fault: object) -> None:
@@ -132,7 +136,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         if content != _sealed(path, data):
             _warn(f"{self._folder}: damaged compiled code is not used, but compiled and kept anew")
             return None
-        return CompileResult._rebuild(target_context, *pickle.loads(data))
+        return CompileResult._rebuild(target_context, *_Unpickler(io.BytesIO(data)).load())
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store code for later processes; if that fails, a warning names the remedy."""
@@ -161,6 +165,32 @@ class KernelCache(NullCache):  # type: ignore[misc]
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         key = f"{name} {sig} {codegen.magic_tuple()} {sys.version}"
         return self._folder / f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads cached code without the modules of Numba whose functions it contains.
+
+    Numba imports them for the environments of these functions, which takes longer than all else.
+    """
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return what pickled data names, with another way to make environments."""
+        ours = name == "_rebuild_env" and module == Environment.__module__
+        return _environment if ours else super().find_class(module, name)
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Any:
+    """Return the environment of a compiled function of a module, which need not be imported.
+
+    Compiled code reads the constants. Only interpreted code would look up names of the module.
+    """
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment({"__name__": module})
+        found.consts[:] = constants
+        found.env_name = name
+        Environment._memo[name] = found
+    return found
 
 
 def _sealed(path: Path, data: bytes) -> bytes:

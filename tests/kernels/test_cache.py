@@ -136,7 +136,8 @@ def test_a_second_process_compiles_only_scenes_that_none_has_seen(cache, first):
 @pytest.mark.slow
 def test_kept_code_runs_without_the_imports_of_a_compiler(tmp_path):
     # Not in `numba_server`, which has imported all of them.
-    imported = "[name for name in ('numba.np.linalg', 'scipy.linalg') if name in sys.modules]"
+    names = "numba.np.arrayobj", "numba.np.linalg", "scipy.linalg"
+    imported = f"[name for name in {names} if name in sys.modules]"
     words = [sys.executable, "-c", PROGRAM, json.dumps([0, TORSIONAL, imported])]
     folders = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
     for hits, misses in (0, 1), (1, 0):
