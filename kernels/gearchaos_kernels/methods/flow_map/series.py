@@ -223,8 +223,8 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     mobility = piece_of(matrix, (0, states), (states + functions, matrix.shape[1]))
     acting = engaged, springs
     psi, gap, pulled = motion_series((rates, mobility, gaps), acting, inputs, forcing, place)
-    backward = transposed(rates, states), transposed(gaps, states + functions)
-    backward = *backward, transposed(mobility, elements)
+    back_rates, back_gaps = transposed(rates, states), transposed(gaps, states + functions)
+    backward = back_rates, back_gaps, transposed(mobility, elements)
     inverse, moved, switch = inverse_series(backward, acting, place)
 
     # Values at both ends of the step, s = -1 and 1.
