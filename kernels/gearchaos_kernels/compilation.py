@@ -5,7 +5,8 @@ All flags are set here. Three properties of Numba and LLVM shape this file:
 * Cached code of a function contains the code of all functions that it calls. Numba does not notice
   an edit in another file. The cache folder is therefore named after a hash of all kernel sources.
 * Numba optimises every function on its own, and again in every function that it is linked into:
-  five times for the block of lanes. Here only functions that Python calls are optimised.
+  five times for the block of lanes. Here only functions that Python calls are optimised, and all
+  others are linked once.
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Each costs up to half of the speed of the lane loop.
 """
@@ -139,6 +140,32 @@ def align_stack(_typing_context: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+def _marked(*attributes: str) -> Any:
+    """Return an intrinsic that gives attributes of LLVM to the function which calls it."""
+
+    @intrinsic
+    def mark(_typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+            for attribute in attributes:
+                builder.function.attributes.add(attribute)
+            return context.get_dummy_value()
+
+        return types.void(), generate
+
+    return mark
+
+
+apart = _marked("noinline")
+"""Keep the calling function out of its callers, so that it is compiled once."""
+
+compact = _marked("noinline", "optsize")
+"""Also compile it for size, if it takes a small share of the time of a run.
+
+LLVM otherwise unrolls each of its loops and writes several versions of it. Compiling them takes
+longer than all other work on such a function.
+"""
 
 
 def first_element(context: Any, builder: Any, kind: Any, array: Any) -> Any:

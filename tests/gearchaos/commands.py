@@ -91,6 +91,9 @@ LINEAR = (
 HANGS = 1800.0
 """Seconds after which what has not happened never will, on a busy machine either."""
 
+PAGE_HANGS = 300.0
+"""The same for what a page shows: the longest wait is for a kernel that is compiled meanwhile."""
+
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
 

@@ -58,7 +58,8 @@ noise = 1e-3
 [outputs]
 section = ["output_angle"]
 section_points = 20
-lyapunov = false
+# With a tangent vector, as in the other loops of this train.
+lyapunov = true
 motion = false
 """
 

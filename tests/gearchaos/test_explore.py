@@ -26,7 +26,7 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explore import PORTS, _free_port, main
 
-from .commands import HANGS, small_config
+from .commands import PAGE_HANGS, small_config
 
 # Not imported: every process collects all files, and one of them runs this one.
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
@@ -106,7 +106,7 @@ def browser():
 def page(browser, address):
     """Open the page, and see that nothing comes from elsewhere and nothing goes wrong."""
     opened, wrong = browser.new_page(viewport={"width": 1400, "height": 900}), []
-    opened.set_default_timeout(1000.0 * HANGS)
+    opened.set_default_timeout(1000.0 * PAGE_HANGS)
     opened.on("pageerror", lambda error: wrong.append(str(error)))
     opened.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     opened.on("request", lambda asked: wrong.append(asked.url) if foreign(asked.url) else None)
@@ -153,7 +153,7 @@ def click(page, across: float) -> float:
 
     before = lane_in(page.url)
     # A second is enough unless the machine is busy, and a click more does no harm.
-    for _ in range(int(HANGS)):
+    for _ in range(int(PAGE_HANGS)):
         # While panels come in, the diagram moves: a click may fall beside it.
         box = page.locator(".bk-Figure").first.bounding_box()
         place = box["x"] + across * box["width"], box["y"] + 0.5 * box["height"]
@@ -169,7 +169,7 @@ def click(page, across: float) -> float:
 
 def wait_for(page, panel: str, values: np.ndarray) -> list:
     """Wait until a panel shows these values upwards, and return all that it shows."""
-    for _ in range(int(10 * HANGS)):
+    for _ in range(int(10 * PAGE_HANGS)):
         shown = panels(page).get(panel, [{}])
         if np.array_equal(shown[0].get("y", ()), values):
             return shown
@@ -223,7 +223,7 @@ def zoom(page) -> None:
 
 def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
     """See that the picture after a zoom counts the points in view, for each pixel of the screen."""
-    for _ in range(int(10 * HANGS)):
+    for _ in range(int(10 * PAGE_HANGS)):
         drawn = page.evaluate(PICTURE)
         left, low, *_ = drawn["seen"]
         if np.allclose(drawn["frame"][:2], (left, low)):
@@ -384,7 +384,7 @@ def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
 
 def answer_to(address: str, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
     """Return code, headers and text of an answer, as a program gets it that is no browser."""
-    asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=HANGS)
+    asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=PAGE_HANGS)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     asked.request("GET", f"/{path}", headers=named)
     answer = asked.getresponse()

@@ -20,7 +20,7 @@ from gearchaos.figures.ensembles import COLORS
 from gearchaos.figures.style import VERMILION
 from gearchaos.results.reading.result import Result
 
-from .commands import HANGS, small_config
+from .commands import PAGE_HANGS, small_config
 
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"without {', '.join(missing)}")
@@ -176,7 +176,7 @@ def served(browser, folder: Path, file: str, link: str):
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:
             page = browser.new_page(viewport={"width": 1200, "height": 900})
-            page.set_default_timeout(1000.0 * HANGS)
+            page.set_default_timeout(1000.0 * PAGE_HANGS)
             page.goto(server.stdout.readline().strip() + link)
             page.locator(".bk-Figure >> nth=4").wait_for()
             page.locator("pre:has-text('mesh_force')").wait_for()

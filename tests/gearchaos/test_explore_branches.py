@@ -23,7 +23,7 @@ from gearchaos.records.branch import (
 from gearchaos.results.files.boundary_file import BoundarySet, write_boundaries
 from gearchaos.results.files.branch_file import BranchSet, write_branches
 
-from .commands import HANGS, run_module, small_config
+from .commands import PAGE_HANGS, run_module, small_config
 from .test_explore import ASKED, CHROMIUM, OPTIONS, needs_browser
 
 pytestmark = pytest.mark.skipif(find_spec("bokeh") is None, reason="without bokeh")
@@ -179,7 +179,7 @@ def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
     ):
         address = server.stdout.readline().strip()
         page = driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split()).new_page()
-        page.set_default_timeout(1000.0 * HANGS)
+        page.set_default_timeout(1000.0 * PAGE_HANGS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.goto(address)
         page.get_by_text("unstable orbits").wait_for()

@@ -12,7 +12,7 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explorer.text import plain_text
 
-from .commands import HANGS
+from .commands import PAGE_HANGS
 from .test_explore import CHROMIUM, OPTIONS, PERIODS, look, missing
 
 MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
@@ -54,7 +54,7 @@ def test_the_page_of_a_machine_shows_the_motion_of_a_lane(tmp_path):
         sync_playwright() as driver,
     ):
         page = driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split()).new_page()
-        page.set_default_timeout(1000.0 * HANGS)
+        page.set_default_timeout(1000.0 * PAGE_HANGS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         shown = look(page, server.stdout.readline().strip(), "?frequency=0.7")
         server.terminate()

@@ -8,7 +8,7 @@ import numpy as np
 from numba import prange
 from numpy.polynomial import chebyshev
 
-from gearchaos_kernels.compilation import driver, evaluator, part, scalar
+from gearchaos_kernels.compilation import apart, compact, driver, evaluator, part, scalar
 from gearchaos_kernels.contact.elements import Push
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.searching import fourth_derivative
@@ -153,6 +153,7 @@ def make_maps(matrices, elements_on, inputs, forcing, tables, tails, place):
 @part
 def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
+    compact()
     sets, dampers, stiffness, observed, forces = elements_on
     tail = 0.0
     for number in range(place.branches):
@@ -174,6 +175,7 @@ def fill_maps(matrix, elements_on, inputs, forcing, table, place):
 @part
 def with_dampers(matrix, engaged, dampers):
     """Return a matrix of `differentiate` with the dampers of the engaged elements."""
+    compact()
     damped = matrix.copy()
     forced = dampers.shape[1] - 1
     for element in range(engaged.size):
@@ -187,6 +189,7 @@ def with_dampers(matrix, engaged, dampers):
 @part
 def spring_series(stiffness, forcing):
     """Return the series of the stiffness of every element, shape (elements, ORDER, steps)."""
+    compact()
     springs = np.zeros((stiffness.shape[0], forcing.shape[1], forcing.shape[2]))
     for element in range(stiffness.shape[0]):
         for wave in range(forcing.shape[0]):
@@ -210,16 +213,18 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     these steps. Arrays are written in loops, because for a slice Numba also compiles a check of the
     shapes.
     """
+    compact()
     states, columns, elements = place.states, place.columns, place.elements
     engaged, springs, damping, observed, forces = on_branches
     width = springs.shape[2]
     functions = 1 + place.waves
-    rates = matrix[:states, : states + functions].copy()
-    gaps = matrix[states:, : states + functions].copy()
-    mobility = matrix[:states, states + functions :].copy()
+    rates = piece_of(matrix, (0, states), (0, states + functions))
+    gaps = piece_of(matrix, (states, states + elements), (0, states + functions))
+    mobility = piece_of(matrix, (0, states), (states + functions, matrix.shape[1]))
     acting = engaged, springs
     psi, gap, pulled = motion_series((rates, mobility, gaps), acting, inputs, forcing, place)
-    backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
+    back_rates, back_gaps = transposed(rates, states), transposed(gaps, states + functions)
+    backward = back_rates, back_gaps, transposed(mobility, elements)
     inverse, moved, switch = inverse_series(backward, acting, place)
 
     # Values at both ends of the step, s = -1 and 1.
@@ -227,28 +232,44 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
     from_beginning, first = at_beginning(ends[0], back, place)
     end = multiplied(ends[1, :states], from_beginning)
-    along, tail = economised(gap)
-    along = multiplied(along.reshape((TERMS * elements, columns, width)), from_beginning)
-    traced, lost = economised(switch)
-    traced = multiplied(traced.reshape((TERMS * elements, states, width)), first)
+    along, tail = economised(gap, from_beginning)
+    traced, lost = economised(switch, first)
     for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
         tail = np.maximum(tail, left)
     write_maps(end, along, traced, target, place)
     if place.signals > 0:
-        kept, _ = economised(pulled)
-        kept = multiplied(kept.reshape((TERMS * elements, columns, width)), from_beginning)
+        kept, _ = economised(pulled, from_beginning)
         add_dampers(kept, along, engaged, forces)
         write_signals(kept, 0, target, place)
-        kept, _ = economised(observed_series(psi, observed, ORDER))
-        seen = observed.shape[0]
-        kept = multiplied(kept.reshape((TERMS * seen, columns, width)), from_beginning)
+        kept, _ = economised(observed_series(psi, observed, ORDER), from_beginning)
         write_signals(kept, elements, target, place)
     if place.damper < place.signal:
-        kept, lost = economised(moved)
-        kept = multiplied(kept.reshape((TERMS * elements, states, width)), first)
+        kept, lost = economised(moved, first)
         write_dampers(kept, damping, target, place)
         tail = np.maximum(tail, lost)
     return tail
+
+
+@part
+def piece_of(matrix, lines, columns):
+    """Return a piece of a matrix; ``lines``, ``columns``: the first one, and the one after."""
+    compact()
+    piece = np.empty((lines[1] - lines[0], columns[1] - columns[0]))
+    for line in range(piece.shape[0]):
+        for column in range(piece.shape[1]):
+            piece[line, column] = matrix[lines[0] + line, columns[0] + column]
+    return piece
+
+
+@part
+def transposed(matrix, columns):
+    """Return the transpose of the first columns of a matrix."""
+    compact()
+    turned = np.empty((columns, matrix.shape[0]))
+    for line in range(columns):
+        for column in range(matrix.shape[0]):
+            turned[line, column] = matrix[column, line]
+    return turned
 
 
 @part
@@ -258,6 +279,7 @@ def motion_series(matrices, acting, inputs, forcing, place):
     The third one is K times the deflections. Shapes: (ORDER + 1, states + functions, columns *
     width), where drive and waves follow the states, and twice (ORDER, elements, columns * width).
     """
+    compact()
     states, columns, elements = place.states, place.columns, place.elements
     functions = 1 + place.waves
     width = forcing.shape[2]
@@ -296,6 +318,7 @@ def inverse_series(matrices, acting, place):
     The third one is the second one times K. Shapes: (ORDER + 1, states, states * width), and twice
     (ORDER, elements, states * width).
     """
+    compact()
     states, width = place.states, acting[1].shape[2]
     inverse = np.zeros((ORDER + 1, states, states * width))
     moved = np.zeros((ORDER, place.elements, states * width))
@@ -314,6 +337,7 @@ def at_beginning(begin, back, place):
     states, width): the inverse flow there, transposed. Also returns half of the flow from the
     middle to the beginning, transposed, which the `SWITCH` terms contain.
     """
+    compact()
     states, columns, width = place.states, place.columns, begin.shape[2]
     from_beginning = np.zeros((columns, columns, width))
     first = np.zeros((states, states, width))
@@ -334,6 +358,7 @@ def at_beginning(begin, back, place):
 @part
 def write_maps(end, along, traced, target, place):
     """Write maps, gaps and switches of some steps into a table, and how much the gaps bend."""
+    compact()
     states, columns, elements = place.states, place.columns, place.elements
     table, begin = target
     for at in range(end.shape[2]):
@@ -360,6 +385,7 @@ def write_maps(end, along, traced, target, place):
 @part
 def write_dampers(kept, damping, target, place):
     """Write what transfers the force of dampers that act in contact only."""
+    compact()
     table, begin = target
     for at in range(kept.shape[2]):
         piece = table[at, begin + place.damper :]
@@ -405,6 +431,7 @@ def add_product(scale, a, b, target):
 
     Rows and columns that exceed the size of the other matrix or of the target are ignored.
     """
+    apart()
     for line in range(min(a.shape[0], target.shape[0])):
         for source in range(min(a.shape[1], b.shape[0])):
             factor = scale * a[line, source]
@@ -425,6 +452,7 @@ def combined(matrix, series):
 @part
 def multiplied(a, b):
     """Return the products of the matrices of every step; the last axis is that of steps."""
+    apart()
     target = np.zeros((a.shape[0], b.shape[1], b.shape[2]))
     for line in range(a.shape[0]):
         for source in range(b.shape[0]):
@@ -440,8 +468,13 @@ def multiplied(a, b):
 
 
 @part
-def economised(series):
-    """Cut Taylor series to `TERMS` terms; return them and the largest relative error of that."""
+def economised(series, by):
+    """Cut Taylor series to `TERMS` terms, and multiply them by the matrices of every step.
+
+    Returns the terms, shape (TERMS * functions, columns of ``by``, steps), where ``series`` has the
+    shape (ORDER, functions, lines of ``by`` * steps), and the largest relative error of the cut.
+    """
+    compact()
     kept, lost = combined(_KEPT, series), combined(_DROPPED, series)
     most = 0.0
     for column in range(lost.shape[1]):
@@ -449,12 +482,15 @@ def economised(series):
         for term in range(lost.shape[0]):
             together += abs(lost[term, column])
         most = np.maximum(most, together)
-    return kept, most / np.maximum(largest(kept), 1e-300)
+    rows = TERMS * series.shape[1]
+    terms = multiplied(kept.reshape((rows, by.shape[0], by.shape[2])), by)
+    return terms, most / np.maximum(largest(kept), 1e-300)
 
 
 @part
 def largest(matrix):
     """Return the largest absolute value of a matrix, or NaN if it contains one."""
+    compact()
     most = 0.0
     for row in matrix:
         for number in row:

@@ -7,7 +7,7 @@ its damper. Constant parts of observed signals have no column; see `steps.store_
 
 import numpy as np
 
-from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.compilation import compact, part, scalar
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.methods.flow_map.layout import TERMS, layout
 from gearchaos_kernels.models.interfaces import (
@@ -48,6 +48,7 @@ def observed_series(psi, observed, terms):
 
     ``psi``: the series of the motion, drive and waves; see `series.motion_series`.
     """
+    compact()
     series = np.zeros((terms, observed.shape[0], psi.shape[2]))
     constant = observed.shape[1] - 1
     for signal in range(observed.shape[0]):
@@ -67,6 +68,7 @@ def add_dampers(springs, gaps, engaged, forces):
     ``springs``: K times the deflections along a step, and ``gaps``: the gaps, both of shape
     (terms * elements, columns, width).
     """
+    compact()
     elements = engaged.size
     for element in range(elements):
         stiffness = engaged[element] * forces[element, SHARE]
@@ -88,6 +90,7 @@ def write_signals(along, first, target, place):
 
     ``along``: their terms, shape (terms * signals, columns, steps).
     """
+    compact()
     table, begin = target
     signals = along.shape[0] // TERMS
     for at in range(along.shape[2]):
