@@ -12,6 +12,7 @@ from gearchaos.engine.recomputing import computable
 from gearchaos.models import Configuration
 from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness, line_shares
 from gearchaos.models.registry import system_of
+from gearchaos.records.branch import EDGE, GRAZING
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
 
@@ -223,3 +224,42 @@ def test_a_response_may_keep_every_period_of_a_record_that_the_teeth_raised():
     assert motion["time"][-1] == 60.0 and motion.metadata["recorded_periods"] == 63
     assert motion["section_point"].size == 63
     assert "integration.recorded_periods raised from 50 to 63" in motion.metadata["notes"]
+
+
+@pytest.fixture(scope="module")
+def branch():
+    system = gearchaos.System(configured(), pitch_error=3.0)
+    return system.branch(system.orbit(), "pitch_error", 2.5, 3.3)
+
+
+def test_a_branch_closes_after_the_teeth_meet_again(branch):
+    assert branch.period == 1
+    assert branch.ends == (EDGE, EDGE)
+    system = gearchaos.System(configured(), pitch_error=3.0)
+    for at in range(0, branch.value.size, 5):
+        there = gearchaos.System(configured(), pitch_error=branch.value[at])
+        states = there.integrate(21, start=branch.section[at, -1]).states
+        assert states[-1] == pytest.approx(states[0], rel=0, abs=1e-11)
+        # The trace of the equations does not depend on the pitch error.
+        exponents = np.log(np.abs(branch.multipliers[at])) / (21 * system.mesh_period)
+        assert exponents.sum() == pytest.approx(system.sum_of_exponents(), rel=0, abs=1e-8)
+
+
+def test_a_branch_is_a_straight_line_while_all_teeth_stay_in_contact(branch):
+    (grazing,) = branch.specials
+    before = branch.value < grazing.value
+    assert before.sum() > 3
+    states = branch.section[before, -1]
+    line = np.column_stack([branch.value[before], np.ones(before.sum())])
+    fitted, *_ = np.linalg.lstsq(line, states)
+    assert states == pytest.approx(line @ fitted, rel=0, abs=1e-10)
+    multipliers = branch.multipliers[before]
+    assert multipliers == pytest.approx(np.tile(multipliers[:1], (before.sum(), 1)), abs=1e-9)
+
+
+def test_teeth_part_beyond_the_grazing_point_of_a_branch(branch):
+    (grazing,) = branch.specials
+    assert grazing.kind == GRAZING
+    for aside, contact in (-1e-4, 1.0), (1e-4, 0.0):
+        system = gearchaos.System(configured(), pitch_error=grazing.value + aside)
+        assert system.response(periods=21)["contact_tangential"].min() == contact
