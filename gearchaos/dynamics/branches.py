@@ -49,7 +49,7 @@ LONGEST = 0.1
 SMOOTH = 0.97
 """Least cosine between tangents of successive points: lines through them look smooth."""
 
-MOST_POINTS = 4000
+MOST_POINTS = 12000
 """Largest number of points computed along one direction of a branch."""
 
 LOCATED = 1e-11
@@ -302,22 +302,17 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         here = points[-1]
         trials, leaves = yield from _next(curve, points[-2:], distances)
         taken = 0
-        while taken < len(trials):
-            further = _farthest(points[-1], trials[taken:])
-            if not further:
-                break
-            taken += further
-            trial = trials[taken - 1]
-            assert trial is not None, "the farthest point is found"
-            if len(points) > 2 and (yield from _meets(curve, points[-1], trial, start)):
-                return [*points, trial], CLOSED_CURVE
-            points.append(trial)
+        while (further := _farthest(points[-1], trials[taken:])) is not None:
+            here, last, taken = points[-1], further[-1], taken + len(further)
+            if len(points) > 2 and (yield from _meets(curve, here, last, start)):
+                return [*points, *further], CLOSED_CURVE
+            points += further
         if leaves and taken == len(trials):
             return points, EDGE
         first = trials[0]
         if taken:
             # Far beyond the first that fails, hardly any is found.
-            distances = _distances(_after(*points[-2:]), min(taken + 3, curve.ahead))
+            distances = _distances(_after(here, points[-1]), min(taken + 3, curve.ahead))
             continue
         if first is not None and _passes_half(here, first) and here.half_return < SIDEWAYS:
             return points, HALVING
@@ -344,14 +339,14 @@ def _shorter(step: float, many: int) -> Floats:
     return np.asarray(step * FALL ** -np.arange(many - 1.0, -1.0, -1.0))
 
 
-def _farthest(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> int:
-    """Return how many of the next points of a curve a point may be joined to; the last is taken."""
-    number = 0
+def _farthest(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> list[CurvePoint] | None:
+    """Return the next points of a curve to the last of which a point may be joined, or None."""
+    found: list[CurvePoint] = []
     for trial in trials:
         if trial is None or not _succeeds(here, trial) or _passes_half(here, trial):
             break
-        number += 1
-    return number
+        found.append(trial)
+    return found or None
 
 
 def _after(here: CurvePoint, trial: CurvePoint) -> float:
