@@ -340,7 +340,7 @@ def _shorter(step: float, many: int) -> Floats:
 
 
 def _farthest(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> list[CurvePoint] | None:
-    """Return the next points of a curve to the last of which a point may be joined, or None."""
+    """Return the next points of a curve that a point may be joined to, or None."""
     found: list[CurvePoint] = []
     for trial in trials:
         if trial is None or not _succeeds(here, trial) or _passes_half(here, trial):
