@@ -50,16 +50,25 @@ class BranchRange(NamedTuple):
         """Return the systems at shares of the way (lanes,): the same for all curves."""
         return self.system_at(shares)
 
+    def own_maps(self, method: str) -> bool:
+        """Return whether every share of the way has flow maps of its own."""
+        return bool(np.ptp(METHODS[method].sharing(self.system_at(PLACES))))
+
+    def steps_of_maps(self, plan: Plan) -> int:
+        """Return the steps per period that series of flow maps usually need, at least the plan's.
+
+        With these steps maps are made once; with fewer they are made anew with twice as many.
+        """
+        if not self.own_maps(plan.method):
+            return plan.steps_per_period
+        taken = [steps_taken(self.system_at(share), plan) for share in PLACES[:, np.newaxis]]
+        return sorted(taken)[len(taken) // 2]
+
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
-        steps, method = plan.steps_per_period, plan.method
-        own_maps = np.unique(METHODS[method].sharing(self.system_at(PLACES))).size > 1
-        if own_maps:
-            # Maps are made once if the plan has as many steps as their series usually need.
-            taken = [steps_taken(self.system_at(share), plan) for share in PLACES[:, np.newaxis]]
-            steps = sorted(taken)[len(taken) // 2]
+        own_maps, steps = self.own_maps(plan.method), self.steps_of_maps(plan)
         ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
         whole = period * self.system_at(np.zeros(1)).repeats_after
-        plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
+        plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=plan.method)
         ahead = min(max(ahead, 1), MOST_AHEAD)
         return Curve(self.systems_at, 0, plan, period, scale, ahead, own_maps)

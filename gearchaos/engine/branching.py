@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
-from gearchaos.arrays import Floats
+from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import (
@@ -133,28 +133,41 @@ class BranchSearch:
         lanes, shares = lanes[np.argsort(shares, kind="stable")], np.sort(shares, kind="stable")
         if not lanes.size:
             return []
-        states = result.lanes("end_state")[lanes]
-        system = self.over.system_at(shares)
-        periods = int(period[lanes].max()) * system.repeats_after
-        plan = self.run.plan._replace(
-            transient_periods=0,
-            recorded_periods=periods,
-            section_points=periods,
-            tangent=False,
-            contact=False,
-            loads=False,
-            states=(),
-            orders=(),
-        )
-        sections = integrate(system, states, plan).every(system.repeats_after).section
+        periods = period[lanes].tolist()
+        sections = self._sections(result.lanes("end_state")[lanes], shares, period[lanes])
         # One scale for all branches: that of one motion would be too small along the branch.
         if self._scale is None:
-            self._scale = coordinate_scale(sections.reshape(1, -1, states.shape[1]))[0]
-        periods_of = period[lanes].tolist()
+            self._scale = coordinate_scale(np.concatenate(sections)[np.newaxis])[0]
         return [
-            _Motion(share, section[:n], n)
-            for share, section, n in zip(shares.tolist(), sections, periods_of, strict=True)
+            _Motion(*of_motion)
+            for of_motion in zip(shares.tolist(), sections, periods, strict=True)
         ]
+
+    def _sections(self, states: Floats, shares: Floats, periods: Integers) -> list[Floats]:
+        """Return the section of every settled motion over its period, each (period, states).
+
+        That of period 1 has one point, which is known; only the others are integrated.
+        """
+        sections = [state[np.newaxis] for state in states]
+        (longer,) = np.nonzero(periods > 1)
+        if longer.size:
+            system = self.over.system_at(shares[longer])
+            whole = int(periods.max()) * system.repeats_after
+            plan = self.run.plan._replace(
+                steps_per_period=self.over.steps_of_maps(self.run.plan),
+                transient_periods=0,
+                recorded_periods=whole,
+                section_points=whole,
+                tangent=False,
+                contact=False,
+                loads=False,
+                states=(),
+                orders=(),
+            )
+            outcome = integrate(system, states[longer], plan).every(system.repeats_after)
+            for lane, section in zip(longer.tolist(), outcome.section, strict=True):
+                sections[lane] = section[: periods[lane]]
+        return sections
 
     def follow(self, motions: Sequence[_Motion]) -> None:
         """Follow the orbits of motions that lie on no known branch, with doublings.

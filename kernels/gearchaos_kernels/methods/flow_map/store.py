@@ -137,16 +137,18 @@ class _Kept:
     """Computed maps in one table, one after the other, until no more fit.
 
     ``places``: steps per period and place of the maps of a lane, by scene and parameters; see
-    `on_demand` for those of single sets of branches.
+    `on_demand` for those of single sets of branches. ``steps``: those of the last maps, by scene.
     """
 
     def __init__(self, size: int) -> None:
         self.table = np.empty(max(size, MAP_BYTES // 8))
         self.used = 0
         self.places: dict[Hashable, tuple[int, int]] = {}
+        self.steps: dict[Hashable, int] = {}
 
-    def keep(self, name: Hashable, maps: Floats) -> None:
-        """Store the maps of a lane, shape (steps, size of a step)."""
+    def keep(self, name: tuple[Hashable, bytes], maps: Floats) -> None:
+        """Store the maps of a lane, shape (steps, size of a step), by scene and parameters."""
+        self.steps[name[0]] = len(maps)
         self.table[self.used : self.used + maps.size] = maps.reshape(-1)
         place, self.used = self.used, self.used + maps.size
         # Last, so that a process forked meanwhile finds no name without its maps.
@@ -169,9 +171,12 @@ def maps_of(
     scene = scene.bare()
     name = (steps, type(scene.model), scene.model, *which_maps(scene), system.map_constants())
     names = [(name, row.tobytes()) for row in system.map_parameters()]
-    done, together = 0, 1
+    done, step_size = 0, layout_of(scene).step_size
     while done < len(names):
-        some = range(done, min(done + together, len(names)))
+        # Lanes of a scene need about the same number of steps. The first one is made alone.
+        made_last = _kept.steps.get(name)
+        most = map_bytes // (32 * made_last * step_size) if made_last else 1
+        some = range(done, min(done + max(1, min(LANES, most)), len(names)))
         new = [number for number in some if names[number] not in _kept.places]
         made = _make(system.of(new), steps, scene) if new else []
         size = sum(maps.size for maps in made)
@@ -184,10 +189,6 @@ def maps_of(
         for number, maps in zip(new, made, strict=True):
             _kept.keep(names[number], maps)
         done += len(some)
-        # Neighbouring lanes need about the same number of steps.
-        steps_made, _ = _kept.places[names[done - 1]]
-        size = 8 * steps_made * layout_of(scene).step_size
-        together = max(1, min(LANES, map_bytes // (4 * size)))
     return _kept.table, np.array([_kept.places[name] for name in names[:done]], dtype=np.intp).T
 
 
