@@ -5,8 +5,7 @@ All flags are set here. Three properties of Numba and LLVM shape this file:
 * Cached code of a function contains the code of all functions that it calls. Numba does not notice
   an edit in another file. The cache folder is therefore named after a hash of all kernel sources.
 * Numba optimises every function on its own, and again in every function that it is linked into:
-  five times for the block of lanes. Here only functions that Python calls are optimised, and all
-  others are linked once.
+  five times for the block of lanes. Here only functions that Python calls are optimised.
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Each costs up to half of the speed of the lane loop.
 """
