@@ -1,6 +1,9 @@
 """Machines from their matrices: what a file may say, and the message for what it may not."""
 
 import json
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -184,3 +187,17 @@ def test_any_number_of_a_machine_can_be_swept():
     assert section.shape[:2] == (2, 2)
     # A stop that is never met leaves a linear machine, whose motion is proportional to the force.
     np.testing.assert_allclose(section[1, 1], 2.0 * section[0, 1], rtol=1e-9)
+
+
+def test_threads_that_share_a_configuration_get_the_machines_of_their_own_values(request):
+    request.addfinalizer(partial(sys.setswitchinterval, sys.getswitchinterval()))
+    sys.setswitchinterval(1e-6)
+    config = read(TEXT)
+    path = "clearance.stop.half_clearance"
+
+    def right(value):
+        found = [config.machine({path: value}).half_clearance[0] for _ in range(2000)]
+        return set(found) == {value}
+
+    with ThreadPoolExecutor(4) as threads:
+        assert all(threads.map(right, (0.5, 1.0, 1.5, 2.0)))

@@ -48,6 +48,7 @@ def test_a_swinging_mass_has_one_line_and_the_extremes_of_a_sine():
     system, frequency = swinging()
     # Half a swing in every mesh period: delta_5 turns where a step ends, its rate in between.
     plan = PLAN._replace(transient_periods=0, states=("delta_5", "delta_5_rate"), orders=ORDERS)
+    plan = plan._replace(resolved=False, contact=False)
     outcome = integrate(system, state(delta_5=amplitude)[np.newaxis], plan)
     sizes = np.array([amplitude, amplitude * frequency])
     assert outcome.extremes[0] == pytest.approx(np.outer(sizes, [-1.0, 1.0]), rel=1e-7)

@@ -66,16 +66,18 @@ class MachineConfiguration(Configuration):
         """Return the machine with these values of the swept parameters."""
         others = {path: value for path, value in values.items() if path != self.rate}
         chosen = tuple(others.items())
-        # Continuation needs the same machine at other frequencies at every step.
-        if self._last_parts.get("values") != chosen:
-            self._last_parts.update(values=chosen, parts=self.parts(others))
-        parts: Parts = self._last_parts["parts"]
+        # Continuation needs the same machine at other frequencies at every step. Both are replaced
+        # at once, because other threads may use them.
+        last, parts = self._last_parts[0]
+        if parts is None or last != chosen:
+            parts = self.parts(others)
+            self._last_parts[0] = chosen, parts
         return parts.machine(self.frequency_at(values))
 
     @cached_property
-    def _last_parts(self) -> dict[str, Any]:
-        """The parts that were used last, with their values."""
-        return {}
+    def _last_parts(self) -> list[tuple[tuple[tuple[str, float], ...], Parts | None]]:
+        """One entry: the parts that were used last, with their values."""
+        return [((), None)]
 
     @abstractmethod
     def actuator_at(self, values: Mapping[str, float], name: str) -> Actuator:
