@@ -302,7 +302,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         here = points[-1]
         trials, leaves = yield from _next(curve, points[-2:], distances)
         taken = 0
-        while (further := _farthest(points[-1], trials[taken:])) is not None:
+        while (further := _joinable(points[-1], trials[taken:])) is not None:
             here, last, taken = points[-1], further[-1], taken + len(further)
             if len(points) > 2 and (yield from _meets(curve, here, last, start)):
                 return [*points, *further], CLOSED_CURVE
@@ -339,7 +339,7 @@ def _shorter(step: float, many: int) -> Floats:
     return np.asarray(step * FALL ** -np.arange(many - 1.0, -1.0, -1.0))
 
 
-def _farthest(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> list[CurvePoint] | None:
+def _joinable(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> list[CurvePoint] | None:
     """Return the next points of a curve that a point may be joined to, or None."""
     found: list[CurvePoint] = []
     for trial in trials:
