@@ -18,6 +18,9 @@ from scipy.integrate import solve_ivp
 
 TOLERANCE = 1e-13
 
+LONGEST_STEP = 0.05
+"""An event is seen by the signs at both ends of a step: a longer one misses short excursions."""
+
 SIZES = [(1, 1), (3, 2), (6, 4)]
 SIZES_OF_MAPS = [(1, 1, 6), (3, 2, 6), (5, 6, 4)]
 """Coordinates, elements, and number of machines.
@@ -145,6 +148,7 @@ class Piecewise:
             method="DOP853",
             rtol=TOLERANCE,
             atol=TOLERANCE,
+            max_step=LONGEST_STEP,
             events=events,
         )
         for times, target in zip(done.t_events, targets, strict=True):
