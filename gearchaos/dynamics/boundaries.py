@@ -11,7 +11,7 @@ import numpy as np
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import CurvePoint, cubic
-from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
+from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_following import (
     SHORT_STEP,
     Path,
@@ -20,6 +20,7 @@ from gearchaos.dynamics.boundary_following import (
     following,
 )
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
+from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CUSP,

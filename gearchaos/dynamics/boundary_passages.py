@@ -1,7 +1,8 @@
 """Orbits from many places of boundaries, computed in shared calls of the kernel.
 
 Boundaries that are followed side by side request the orbits that they need; places with the same
-method and steps are lanes of one call.
+method and steps are lanes of one call. Derivatives are differences between lanes; only the
+derivative of the map by the state is that of the tangent flow.
 """
 
 from collections.abc import Sequence
@@ -17,49 +18,150 @@ from gearchaos_kernels import (
     integrate,
 )
 
-from gearchaos.arrays import Floats, Integers, Mask
+from gearchaos.arrays import Complex, Floats, Integers, Mask
+from gearchaos.dynamics.boundary_tests import (
+    CRITICAL,
+    Reference,
+    multipliers_of,
+    null_vectors,
+    solved,
+    tests_of,
+)
+from gearchaos.dynamics.curve_defects import DIFFERENCE
 from gearchaos.dynamics.side_by_side import Found, Search
+from gearchaos.records.branch import GRAZING
 
 if TYPE_CHECKING:
     from gearchaos.dynamics.boundary_equations import Equations
 
 PARAMETERS = 2
 
+STATE_DIFFERENCE = 1e-7
+"""Difference of a state, in its scale, with which the test function is differentiated."""
+
 
 class Passing(NamedTuple):
-    """A request for the orbits of some places of a boundary.
+    """A request for the orbit of a place of a boundary.
 
     Attributes
     ----------
     equations : Equations
         The equations of the boundary.
-    places : array, shape (places, states + 2)
-        States in their scales, then the shares of both ranges.
-    whole : array of bool, shape (places,)
-        Whether the monodromy matrix is needed.
-    phase : float
-        For a grazing, where the extreme of the gap is expected, in steps; NaN if it is unknown.
+    place : array, shape (states + 2,)
+        The state in its scales, then the shares of both ranges.
+    reference : Reference or None
+        What the test function is continued from; None if it is not needed.
+    direction : array, shape (states + 2,)
+        Normal of the plane in which a point of the boundary is searched.
+    slopes : array, shape (states + 1, states + 2), or None
+        Derivatives of the equations by the place, if those of a place nearby are used.
     """
 
     equations: "Equations"
-    places: Floats
-    whole: Mask
-    phase: float = np.nan
+    place: Floats
+    reference: Reference | None = None
+    direction: Floats = np.zeros(0)
+    slopes: Floats | None = None
+
+    @property
+    def differentiated(self) -> bool:
+        """Whether the derivatives have to be computed."""
+        return self.reference is not None and self.slopes is None
 
 
 class Passed(NamedTuple):
-    """Orbits from some places.
+    """The orbit from a place. Without a reference, test function and steps are NaN.
 
     Attributes
     ----------
-    defect : array, shape (places, states)
-        P(x) - x in the scales; P is the map over the period.
-    monodromy : array, shape (places, states, states)
-        Derivative of P, in the scales; NaN where it was not requested.
-    section : array, shape (places, periods, states)
+    defect : array, shape (states + 1,)
+        P(x) - x in the scales, where P is the map over the period, and the test function.
+    slopes : array, shape (states + 1, states + 2)
+        Its derivatives by the place, or those of the request.
+    step : array, shape (states + 2,)
+        The step of Newton's method, which is added to the place; NaN if there is none.
+    monodromy : array, shape (states, states)
+        Derivative of P, in the scales.
+    multipliers : array of complex, shape (states,)
+        Floquet multipliers, largest modulus first.
+    left, right : array, shape (states,)
+        Null vectors at a fold or a period doubling; NaN otherwise.
+    section : array, shape (periods, states)
         States at the ends of the excitation periods, dimensionless.
-    beyond, phase : array, shape (places,)
+    beyond, phase : float
         For a grazing, how far the extreme of the gap lies beyond the flank, and where.
+    """
+
+    defect: Floats
+    slopes: Floats
+    step: Floats
+    monodromy: Floats
+    multipliers: Complex
+    left: Floats
+    right: Floats
+    section: Floats
+    beyond: float
+    phase: float
+
+
+Following: TypeAlias = Search[Passing, Passed, Found]
+"""Yields requests of orbits, is sent the orbits, and returns the result."""
+
+
+class _Places(NamedTuple):
+    """The places of some requests: their own, then those beside for derivatives.
+
+    Attributes
+    ----------
+    of, column : array of int, shape (places,)
+        Number of the request; 0 for its own place, else 1 + the component that differs.
+    first : array of int, shape (requests,)
+        Number of the own place of each request.
+    sought : array of int
+        Numbers of the requests with derivatives.
+    steps : array, shape (requests, states + 2)
+        Differences of the components.
+    places : array, shape (places, states + 2)
+        The places.
+    """
+
+    of: Integers
+    column: Integers
+    first: Integers
+    sought: Integers
+    steps: Floats
+    places: Floats
+
+    @classmethod
+    def around(cls, requests: Sequence[Passing]) -> "_Places":
+        """Return the places of some requests."""
+        own = np.array([one.place for one in requests])
+        differentiated = np.array([one.differentiated for one in requests])
+        counts = np.where(differentiated, 1 + own.shape[1], 1)
+        first = np.cumsum(counts) - counts
+        of = np.repeat(np.arange(len(own)), counts)
+        column = np.arange(of.size) - first[of]
+        shares = np.clip(own[:, -PARAMETERS:], 0.0, 1.0)
+        steps = np.full(own.shape, STATE_DIFFERENCE)
+        steps[:, -PARAMETERS:] = np.where(shares < 0.5, DIFFERENCE, -DIFFERENCE)
+        places = own[of]
+        (beside,) = np.nonzero(column)
+        which, by = of[beside], column[beside] - 1
+        places[beside, -PARAMETERS:] = shares[which]
+        places[beside, by] += steps[which, by]
+        return cls(of, column, first, np.flatnonzero(differentiated), steps, places)
+
+    @property
+    def beside(self) -> Integers:
+        """Numbers of the places beside, (requests with derivatives, states + 2)."""
+        return np.asarray(self.first[self.sought, np.newaxis] + 1 + np.arange(self.steps.shape[1]))
+
+
+class _Orbits(NamedTuple):
+    """Orbits from places.
+
+    ``defect`` (places, states); ``monodromy`` (places, states, states), NaN where it is not needed;
+    ``section`` (places, mesh periods, states); ``beyond`` and ``phase`` (places,).
     """
 
     defect: Floats
@@ -67,10 +169,7 @@ class Passed(NamedTuple):
     section: Floats
     beyond: Floats
     phase: Floats
-
-
-Following: TypeAlias = Search[Passing, Passed, Found]
-"""Yields requests of orbits, is sent the orbits, and returns the result."""
+    repeats: int
 
 
 class _Lanes(NamedTuple):
@@ -112,13 +211,45 @@ def _shared(equations: "Equations") -> object:
 
 def _passed_together(requests: Sequence[Passing]) -> list[Passed]:
     """Return the orbits of requests that one integration can answer."""
-    equations = requests[0].equations
-    places = np.concatenate([one.places for one in requests])
-    counts = np.array([len(one.places) for one in requests])
-    scale = np.repeat([one.equations.scale for one in requests], counts, axis=0)
+    around = _Places.around(requests)
+    orbits = _integrated(requests, around)
+    first = around.first
+    values = _tests(requests, around, orbits)
+    slopes = _slopes(requests, around, orbits, values)
+    defect = np.concatenate([orbits.defect[first], values[first, np.newaxis]], axis=1)
+    steps = _steps(requests, slopes, defect)
+    monodromy = orbits.monodromy[first]
+    multipliers, (left, right) = multipliers_of(monodromy), _vectors(requests, monodromy)
+    repeats = orbits.repeats
+    whole = [one.equations.plan.recorded_periods // repeats for one in requests]
+    every = orbits.section[first][:, repeats - 1 :: repeats]
+    return [
+        Passed(*one)
+        for one in zip(
+            defect,
+            slopes,
+            steps,
+            monodromy,
+            multipliers,
+            left,
+            right,
+            [section[-periods:] for section, periods in zip(every, whole, strict=True)],
+            orbits.beyond[first].tolist(),
+            orbits.phase[first].tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _integrated(requests: Sequence[Passing], around: _Places) -> _Orbits:
+    """Integrate the lanes of all places over their periods."""
+    equations, places, of = requests[0].equations, around.places, around.of
+    scale = np.array([one.equations.scale for one in requests])[of]
     periods = np.array([one.equations.plan.recorded_periods for one in requests])
     states = scale.shape[1]
-    lanes = _Lanes.of(np.concatenate([one.whole for one in requests]), states)
+    # A grazing is differentiated without the tangent flow of the displaced orbits.
+    grazing = np.array([one.equations.kind == GRAZING for one in requests])
+    lanes = _Lanes.of((around.column == 0) | ~grazing[of], states)
     of_places = equations.system_at(np.clip(places[:, states:], 0.0, 1.0))
     longest = int(periods.max())
     plan = equations.plan._replace(recorded_periods=longest, section_points=longest)
@@ -127,23 +258,89 @@ def _passed_together(requests: Sequence[Passing]) -> list[Passed]:
         (places[:, :states] * scale)[lanes.places],
         plan,
         tangent_start=lanes.tangents,
-        periods=np.repeat(periods, counts)[lanes.places] if np.ptp(periods) else None,
+        periods=periods[of[lanes.places]] if np.ptp(periods) else None,
     )
-    defect = outcome.section[lanes.first, -1] / scale - places[:, :states]
+    section = outcome.section[lanes.first]
+    defect = section[:, -1] / scale - places[:, :states]
     monodromy = _monodromies(outcome, lanes, scale)
     beyond = phase = np.full(len(places), np.nan)
     if plan.history_periods:
-        flanks = np.repeat([one.equations.flank for one in requests], counts)
-        wanted = np.repeat([one.phase for one in requests], counts)
+        flanks = np.array([one.equations.flank for one in requests])[of]
+        references = [one.reference for one in requests]
+        wanted = np.array([np.nan if one is None else one.phase for one in references])[of]
         history = outcome.history[lanes.first]
         beyond, phase = nearest_extremes(of_places, plan, history, flanks, wanted)
-    section, found, at = outcome.section[lanes.first], [], 0
-    for whole, count in zip(periods // of_places.repeats_after, counts, strict=True):
-        own = slice(at, at + count)
-        every = section[own, of_places.repeats_after - 1 :: of_places.repeats_after][:, -whole:]
-        found.append(Passed(defect[own], monodromy[own], every, beyond[own], phase[own]))
-        at += count
+    return _Orbits(defect, monodromy, section, beyond, phase, of_places.repeats_after)
+
+
+def _numbers_by_kind(requests: Sequence[Passing]) -> dict[str, list[int]]:
+    """Return the numbers of the requests of each kind of boundary."""
+    found: dict[str, list[int]] = {}
+    for number, one in enumerate(requests):
+        found.setdefault(one.equations.kind, []).append(number)
     return found
+
+
+def _tests(requests: Sequence[Passing], around: _Places, orbits: _Orbits) -> Floats:
+    """Return the test functions of all places, (places,); NaN without a reference."""
+    values = np.full(around.of.size, np.nan)
+    for kind, numbers in _numbers_by_kind(requests).items():
+        of_kind = np.zeros(len(requests), dtype=bool)
+        of_kind[[one for one in numbers if requests[one].reference is not None]] = True
+        (places,) = np.nonzero(of_kind[around.of])
+        if kind == GRAZING:
+            values[places] = orbits.beyond[places]
+        elif places.size:
+            references = [
+                requests[one].reference or Reference() for one in around.of[places].tolist()
+            ]
+            values[places] = tests_of(kind, orbits.monodromy[places], references)
+    return values
+
+
+def _slopes(
+    requests: Sequence[Passing], around: _Places, orbits: _Orbits, values: Floats
+) -> Floats:
+    """Return the derivatives of the equations, (requests, states + 1, states + 2)."""
+    count, size = around.steps.shape
+    states = size - PARAMETERS
+    slopes = np.full((count, size - 1, size), np.nan)
+    for number, one in enumerate(requests):
+        if one.slopes is not None:
+            slopes[number] = one.slopes
+    sought, beside = around.sought, around.beside
+    own, steps = around.first[sought], around.steps[sought]
+    slopes[sought, :states, :states] = orbits.monodromy[own] - np.eye(states)
+    shifted = orbits.defect[beside[:, states:]] - orbits.defect[own, np.newaxis]
+    by_shares = shifted / steps[:, states:, np.newaxis]
+    slopes[sought, :states, states:] = by_shares.transpose(0, 2, 1)
+    slopes[sought, -1] = (values[beside] - values[own, np.newaxis]) / steps
+    return slopes
+
+
+def _steps(requests: Sequence[Passing], slopes: Floats, defect: Floats) -> Floats:
+    """Return steps of Newton's method in planes, (requests, states + 2); NaN if there is none."""
+    count, equations, size = slopes.shape
+    steps = np.full((count, size), np.nan)
+    usable = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(defect).all(axis=1)
+    (numbers,) = np.nonzero(usable)
+    if numbers.size:
+        bordered = np.zeros((numbers.size, size, size))
+        bordered[:, :equations] = slopes[numbers]
+        bordered[:, -1] = [requests[number].direction for number in numbers.tolist()]
+        sides = np.zeros((numbers.size, size, 1))
+        sides[:, :equations, 0] = defect[numbers]
+        steps[numbers] = -solved(bordered, sides)[..., 0]
+    return steps
+
+
+def _vectors(requests: Sequence[Passing], monodromy: Floats) -> tuple[Floats, Floats]:
+    """Return left and right null vectors of all requests, (requests, states); NaN without them."""
+    left, right = np.full((2, *monodromy.shape[:2]), np.nan)
+    for kind, numbers in _numbers_by_kind(requests).items():
+        if kind in CRITICAL:
+            left[numbers], right[numbers] = null_vectors(kind, monodromy[numbers])
+    return left, right
 
 
 def _monodromies(outcome: Outcome, lanes: _Lanes, scale: Floats) -> Floats:

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
-from gearchaos.arrays import Floats
+from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import CurvePoint
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
-from gearchaos.dynamics.boundary_equations import Equations, OnBoundary, Reference
+from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
+from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.side_by_side import run, together
@@ -280,15 +281,14 @@ class _BoundarySearch:
         requests = [
             Passing(
                 self._equations(one.period, FOLD),
-                np.append(one.state / self.scale, one.shares)[np.newaxis],
-                np.ones(1, dtype=bool),
+                np.append(one.state / self.scale, one.shares),
             )
             for one in some
         ]
         return [
             self._from_change(one, kind)
             for one, passed in zip(some, passed_of(requests), strict=True)
-            for kind in _kinds(one, passed.monodromy[0])
+            for kind in _kinds(one, passed.multipliers)
         ]
 
     def _equations(self, period: int, kind: str, flank: int = -1) -> Equations:
@@ -452,14 +452,13 @@ class _BoundarySearch:
         )
 
 
-def _kinds(change: MapChange, monodromy: Floats) -> list[str]:
-    """Return the kinds of boundaries that may be near the motion of a change."""
+def _kinds(change: MapChange, values: Complex) -> list[str]:
+    """Return the kinds of boundaries that may be near a motion with multipliers (states,)."""
     if change.flank >= 0:
         return [GRAZING]
-    if not np.isfinite(monodromy).all():
+    if not np.isfinite(values).all():
         return []
-    values = np.linalg.eigvals(monodromy)
-    leading = complex(values[np.argmax(np.abs(values))])
+    leading = complex(values[0])
     found = [FOLD] if np.any((values.imag == 0.0) & (values.real > NEAR_FOLD)) else []
     if leading.imag:
         found.append(NEIMARK_SACKER)
