@@ -82,7 +82,7 @@ def multipliers_of(monodromy: Floats) -> Complex:
 
 def _finite_only(function: Callable[[Floats], Any], matrices: Floats) -> tuple[Any, Mask]:
     """Return a function of the matrices without infinite entries, and which they are."""
-    finite: Mask = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     return function(matrices[finite]), finite
 
 
