@@ -28,11 +28,18 @@ class BranchRange(NamedTuple):
         Returns the systems of the lanes at values (lanes,) of the parameter.
     low, high : float
         The range; shares of the way run from the first to the second.
+    number : int
+        Number of the range among others over which branches are followed side by side.
+    shared : callable or None
+        Returns the systems of lanes from the numbers of their ranges and the shares of the way,
+        both (lanes,); None if there is no other range.
     """
 
     system_of: Callable[[Floats], LaneSystem]
     low: float
     high: float
+    number: int = 0
+    shared: Callable[[Integers, Floats], LaneSystem] | None = None
 
     def value(self, share: Floats) -> Floats:
         """Return the values of the parameter at shares of the way."""
@@ -46,9 +53,9 @@ class BranchRange(NamedTuple):
         """Return the systems at shares of the way (lanes,)."""
         return self.system_of(self.value(shares))
 
-    def systems_at(self, _numbers: Integers, shares: Floats) -> LaneSystem:
-        """Return the systems at shares of the way (lanes,): the same for all curves."""
-        return self.system_at(shares)
+    def systems_at(self, numbers: Integers, shares: Floats) -> LaneSystem:
+        """Return the systems at shares of the way, in the ranges with some numbers, (lanes,)."""
+        return self.system_at(shares) if self.shared is None else self.shared(numbers, shares)
 
     def own_maps(self, method: str) -> bool:
         """Return whether every share of the way has flow maps of its own."""
@@ -71,4 +78,4 @@ class BranchRange(NamedTuple):
         whole = period * self.system_at(np.zeros(1)).repeats_after
         plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=plan.method)
         ahead = min(max(ahead, 1), MOST_AHEAD)
-        return Curve(self.systems_at, 0, plan, period, scale, ahead, own_maps)
+        return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)

@@ -1,13 +1,13 @@
 """The boundaries of a map: where its periodic orbits fold, double, turn or graze."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
-from gearchaos.arrays import Complex, Floats
+from gearchaos.arrays import Complex, Floats, Integers
 from gearchaos.dynamics.arclength import CurvePoint
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
@@ -15,6 +15,7 @@ from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing,
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import Special, TracedBranch
+from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
@@ -47,6 +48,9 @@ from gearchaos.results.reading.stage_table import require_labels
 
 LINES, PERIODS = 4, 1
 """Default of the lines across the map, and of the longest period."""
+
+SIDE_BY_SIDE = 8
+"""Number of lines that are searched side by side."""
 
 COARSE = 24
 """Values of each parameter of the map that is computed from a configuration."""
@@ -120,11 +124,14 @@ def find_boundaries(
     ]
     with one_thread(), progress(len(places), unit="lines") as bar:
         try:
-            search.from_changes(result)
-            for number, share in places:
+            search.begin_with_changes(result)
+            for first in range(0, len(places), SIDE_BY_SIDE):
                 check()
-                search.along_line(result, number, share)
-                bar.update()
+                some = places[first : first + SIDE_BY_SIDE]
+                branches = search.along_lines(result, some)
+                bar.update(len(some))
+                say(f"{len(some)} lines: {branches} branches; {len(search.found)} boundaries")
+            search.from_changes()
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{bar.n} of {len(places)} lines were searched")
             if keep is not None and search.found:
@@ -182,15 +189,32 @@ class _Ranges(NamedTuple):
         columns = dict(zip(self.parameters, self.values(shares).T, strict=True))
         return system_of(self.config, columns, self.config.needed_effects)
 
-    def line(self, number: int, value: float) -> BranchRange:
-        """Return the range of the other parameter where parameter ``number`` has a value."""
-        name, other = self.parameters[number], self.parameters[1 - number]
+    def line(self, line: "_Line", number: int, lines: Sequence["_Line"]) -> BranchRange:
+        """Return the range along a line, which has a number among others."""
 
-        def systems(at: Floats) -> LaneSystem:
-            values = {other: at, name: np.full(at.size, value)}
+        def systems(numbers: Integers, shares: Floats) -> LaneSystem:
+            values = self.values(np.repeat(shares[:, np.newaxis], PARAMETERS, axis=1))
+            at = np.array([one.number for one in lines])[numbers]
+            values[np.arange(at.size), at] = np.array([one.value for one in lines])[numbers]
+            columns = dict(zip(self.parameters, values.T, strict=True))
+            return system_of(self.config, columns, self.config.needed_effects)
+
+        def systems_of(at: Floats) -> LaneSystem:
+            values = {self.parameters[1 - line.number]: at}
+            values[self.parameters[line.number]] = np.full(at.size, line.value)
             return system_of(self.config, values, self.config.needed_effects)
 
-        return BranchRange(systems, float(self.low[1 - number]), float(self.high[1 - number]))
+        low, high = (float(ends[1 - line.number]) for ends in (self.low, self.high))
+        return BranchRange(systems_of, low, high, number, systems)
+
+
+class _Line(NamedTuple):
+    """A line of a map on which parameter ``number`` has a value, at a share of its range."""
+
+    number: int
+    value: float
+    share: float
+    result: Result
 
 
 class _Begun(NamedTuple):
@@ -214,6 +238,7 @@ class _BoundarySearch:
     def __init__(self, over: _Ranges, run: RunPlan, longest: int, result: Result) -> None:
         self.over, self.run, self.longest = over, run, longest
         self.found: list[TracedBoundary] = []
+        self.left: Changes
         period, states = result.lanes("period"), result.lanes("end_state")
         moving = states[np.isfinite(states).all(axis=1) & (period > 0) & (period <= longest)]
         if not moving.size:
@@ -228,52 +253,85 @@ class _BoundarySearch:
         """
         return [*range(PARAMETERS)] if self.fixed < 0 else [self.fixed]
 
-    def along_line(self, result: Result, number: int, share: float) -> None:
-        """Trace the branches along a line at one value of a parameter, and follow boundaries."""
-        axis = known.axis_name(self.over.parameters[number])
-        wanted = float(self.over.values(np.full(PARAMETERS, share))[number])
-        line = result.sel("nearest", **{axis: wanted})
-        value = line.fixed[axis]
-        # Where branches are traced, the line has exactly the value of its lanes.
-        ends = self.over.low[number], self.over.high[number]
-        place = (value - ends[0]) / (ends[1] - ends[0])
-        branches = BranchSearch(
-            self.over.line(number, value), self.run, self.longest, APPROXIMATE, self.scale
-        )
-        across = known.axis_name(self.over.parameters[1 - number])
-        branches.follow(branches.motions(line, across))
-        self._follow(
-            [
-                self._from_special(branch, special, number, place)
-                for branch in branches.found
-                for special in branch.specials
-                if special.kind != BRANCH_POINT
-            ]
-        )
-        say(f"{axis} = {value:.6g}: {len(branches.found)} branches; {len(self.found)} boundaries")
+    def along_lines(self, result: Result, places: Sequence[tuple[int, float]]) -> int:
+        """Trace the branches along lines, and follow boundaries from them and from changes.
 
-    def from_changes(self, result: Result) -> None:
-        """Follow boundaries from changes of the motion between neighbouring cells of a map."""
+        ``places``: for each line the parameter that it has one value of, and the share of its
+        range. Returns the number of branches.
+        """
+        branches = [*self._branches(result, places)]
+        specials = [
+            self._from_special(branch, special, line)
+            for line, branch in branches
+            for special in branch.specials
+            if special.kind != BRANCH_POINT
+        ]
+        self._follow_with_changes(specials)
+        return len(branches)
+
+    def _branches(
+        self, result: Result, places: Sequence[tuple[int, float]]
+    ) -> Iterator[tuple["_Line", TracedBranch]]:
+        """Trace the branches along lines side by side, and yield each with its line."""
+        lines, searches = self._lines(result, places), list[tuple[BranchSearch, Finding[None]]]()
+        for number, line in enumerate(lines):
+            over = self.over.line(line, number, lines)
+            search = BranchSearch(over, self.run, self.longest, APPROXIMATE, self.scale)
+            across = known.axis_name(self.over.parameters[1 - line.number])
+            searches.append((search, search.following(search.motions(line.result, across))))
+        # Curves that advance side by side have the same number of steps.
+        steps = [one.over.steps_of_maps(self.run.plan) for one, _ in searches]
+        for count in sorted({*steps}):
+            same = [one for (_, one), of in zip(searches, steps, strict=True) if of == count]
+            run(together(same), defects_of)
+        for line, (search, _) in zip(lines, searches, strict=True):
+            axis = known.axis_name(self.over.parameters[line.number])
+            say(f"{axis} = {line.value:.6g}: {len(search.found)} branches")
+            for branch in search.found:
+                yield line, branch
+
+    def _lines(self, result: Result, places: Sequence[tuple[int, float]]) -> list["_Line"]:
+        """Return the lines of a map that are nearest to some places; see `along_lines`."""
+        found = []
+        for number, share in places:
+            axis = known.axis_name(self.over.parameters[number])
+            wanted = float(self.over.values(np.full(PARAMETERS, share))[number])
+            of_map = result.sel("nearest", **{axis: wanted})
+            # Where branches are traced, the line has exactly the value of its lanes.
+            value = of_map.fixed[axis]
+            ends = self.over.low[number], self.over.high[number]
+            found.append(_Line(number, value, (value - ends[0]) / (ends[1] - ends[0]), of_map))
+        return found
+
+    def begin_with_changes(self, result: Result) -> None:
+        """Find the changes of the motion between neighbouring cells of a map."""
         axes = [known.axis_name(one) for one in self.over.parameters]
         ends = np.array([self.over.low, self.over.high])
         impacts = [f"impacts_{side}_{element}" for element in self.run.elements for side in SIDES]
         if any(name not in result.variables for name in impacts):
             impacts = []
-        changes = changes_of(result, axes, ends, self.longest, impacts)
-        left, count = changes, len(changes.flank)
-        while left.flank.size:
+        self.left = changes_of(result, axes, ends, self.longest, impacts)
+        say(f"{len(self.left.flank)} changes of the map")
+
+    def from_changes(self) -> None:
+        """Follow boundaries from changes of the map until those left lead to none."""
+        before = -1
+        while before < len(self.found) and self.left.flank.size:
             check()
-            before, chosen = len(self.found), left.spread(self.fixed)
-            self._follow(self._from_changes(left.of(chosen)))
-            open_still = np.ones(left.flank.size, dtype=bool)
-            open_still[chosen] = False
-            for one in self.found[before:]:
-                same = (left.flank == one.equations.flank) & (left.period == one.period)
-                open_still &= ~(same & left.beside(one.shares))
-            left = left.of(open_still)
-            if len(self.found) == before:
-                break
-        say(f"{count} changes of the map: {len(self.found)} boundaries")
+            before = len(self.found)
+            self._follow_with_changes([])
+
+    def _follow_with_changes(self, searches: list[Following["_Begun"]]) -> None:
+        """Follow boundaries through some points, and from changes that are beside none."""
+        before, left = len(self.found), self.left
+        chosen = left.spread(self.fixed) if left.flank.size else np.zeros(0, dtype=np.intp)
+        self._follow([*searches, *self._from_changes(left.of(chosen))])
+        open_still = np.ones(left.flank.size, dtype=bool)
+        open_still[chosen] = False
+        for one in self.found[before:]:
+            same = (left.flank == one.equations.flank) & (left.period == one.period)
+            open_still &= ~(same & left.beside(one.shares))
+        self.left = left.of(open_still)
 
     def _from_changes(self, changes: Changes) -> list[Following["_Begun"]]:
         """Return the searches of boundaries next to changes of a map."""
@@ -307,14 +365,14 @@ class _BoundarySearch:
         return _Begun(equations, start, guess, None)
 
     def _from_special(
-        self, branch: TracedBranch, special: Special, number: int, place: float
+        self, branch: TracedBranch, special: Special, line: "_Line"
     ) -> Following["_Begun"]:
         """Search the point of a boundary at a special point of a branch."""
         equations = self._equations(branch.period, special.kind, special.flank)
         shares = np.full(PARAMETERS, special.point.share)
-        shares[number] = place
+        shares[line.number] = line.share
         guess = np.concatenate([special.point.place[:-1], shares])
-        start = yield from equations.beginning(guess, self._along(number))
+        start = yield from equations.beginning(guess, self._along(line.number))
         return _Begun(equations, start, guess, special.point)
 
     def _along(self, number: int) -> Floats:

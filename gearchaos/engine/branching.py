@@ -170,21 +170,25 @@ class BranchSearch:
         return sections
 
     def follow(self, motions: Sequence[_Motion]) -> None:
-        """Follow the orbits of motions that lie on no known branch, with doublings.
+        """Follow the orbits of motions that lie on no known branch, with doublings."""
+        run(self.following(motions), defects_of)
+
+    def following(self, motions: Sequence[_Motion]) -> Finding[None]:
+        """Return the search of `follow`.
 
         One motion of every period at a time: others of the period may lie on the same branch.
         """
         known = 0
         while motions:
             # Only branches found since then may hold more of them.
-            held = run(together([self._holds(one, NEAR, known) for one in motions]), defects_of)
+            held = yield from together([self._holds(one, NEAR, known) for one in motions])
             motions = [one for one, is_held in zip(motions, held, strict=True) if not is_held]
             known = len(self.found)
             middle = _middle_of_each_period(motions)
-            self._follow(middle)
+            yield from self._following(middle)
             motions = [one for one in motions if not any(one is other for other in middle)]
 
-    def _follow(self, motions: Sequence[_Motion]) -> None:
+    def _following(self, motions: Sequence[_Motion]) -> Finding[None]:
         """Follow the orbits of motions, then what begins or ends on them, side by side."""
         assert self._scale is not None, "motions() gives the scales"
         waiting = [
@@ -193,12 +197,11 @@ class BranchSearch:
         ]
         while waiting:
             check()
-            waiting = [
-                search
-                for branch in run(together(waiting), defects_of)
-                if branch is not None and not run(self._found_before(branch), defects_of)
-                for search in self._added(branch)
-            ]
+            branches = yield from together(waiting)
+            waiting = []
+            for branch in branches:
+                if branch is not None and not (yield from self._found_before(branch)):
+                    waiting += self._added(branch)
 
     def _from_motion(self, curve: Curve, motion: _Motion) -> Finding[TracedBranch | None]:
         """Search the branch of a motion; None if its orbit is not found or known."""
