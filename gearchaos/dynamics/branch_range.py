@@ -19,6 +19,15 @@ PLACES = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of the way at which the method is looked at."""
 
 
+def only_map_parameter(system: LaneSystem) -> int:
+    """Return the only parameter of flow maps in which lanes differ, -1 if there are others.
+
+    See `Plan.interpolated`.
+    """
+    (differ,) = np.nonzero(np.ptp(system.map_parameters(), axis=0))
+    return int(differ[0]) if differ.size == 1 else -1
+
+
 class BranchRange(NamedTuple):
     """The range of a parameter over which branches are followed.
 
@@ -76,6 +85,9 @@ class BranchRange(NamedTuple):
         own_maps, steps = self.own_maps(plan.method), self.steps_of_maps(plan)
         ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
         whole = period * self.system_at(np.zeros(1)).repeats_after
-        plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=plan.method)
+        along = only_map_parameter(self.system_at(PLACES)) if own_maps else -1
+        plan = Plan(
+            steps, 0, whole, whole, True, contact=True, method=plan.method, interpolated=along
+        )
         ahead = min(max(ahead, 1), MOST_AHEAD)
         return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)

@@ -13,7 +13,7 @@ from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unst
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
 from gearchaos.dynamics.boundary_tests import Reference
-from gearchaos.dynamics.branch_range import BranchRange
+from gearchaos.dynamics.branch_range import BranchRange, only_map_parameter
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
@@ -353,7 +353,8 @@ class _BoundarySearch:
         """Return the equations of a boundary."""
         usual, most = self.steps
         whole = period * self.run.lanes.repeats_after
-        plan = Plan(usual, 0, whole, whole, tangent=True, method=self.run.plan.method)
+        method, along = self.run.plan.method, self.interpolated
+        plan = Plan(usual, 0, whole, whole, tangent=True, method=method, interpolated=along)
         equations = Equations(self.over.system_at, plan, period, self.scale, kind, fixed=self.fixed)
         return equations.grazing(flank, most) if kind == GRAZING else equations
 
@@ -461,6 +462,15 @@ class _BoundarySearch:
             shares[1, number] = 0.75
             depends.append(np.unique(sharing(self.over.system_at(shares))).size > 1)
         return depends.index(True) if sum(depends) == 1 else -1
+
+    @cached_property
+    def interpolated(self) -> int:
+        """The parameter between whose values flow maps are interpolated; see `Plan`."""
+        if self.fixed < 0:
+            return -1
+        shares = np.full((2, PARAMETERS), 0.5)
+        shares[1, self.fixed] = 0.75
+        return only_map_parameter(self.over.system_at(shares))
 
     def described(self, result: Result) -> BoundarySet:
         """Return the boundaries as arrays with their descriptions."""

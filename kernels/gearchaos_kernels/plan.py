@@ -52,6 +52,10 @@ class Plan(NamedTuple):
         Whether lanes that follow each other, as many as states, have the same motion and carry a
         frame of tangent vectors, which is made orthonormal after every mesh period. At most 32
         states.
+    interpolated : int
+        Number of the parameter, a column of `LaneSystem.map_parameters`, between whose values flow
+        maps are interpolated with the accuracy of rounding; -1 if the maps of every value are
+        computed. It saves time if there are more than about 100 values.
 
     Examples
     --------
@@ -77,6 +81,7 @@ class Plan(NamedTuple):
     orders: tuple[Fraction, ...] = ()
     map_bytes: int = MAP_BYTES
     frame: bool = False
+    interpolated: int = -1
 
     @property
     def records_steps(self) -> bool:

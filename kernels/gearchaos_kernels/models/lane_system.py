@@ -330,6 +330,14 @@ class LaneSystem(ABC):
         names = [name for name in self._parameters() if name not in self.unit_inputs]
         return np.stack([getattr(self, name) for name in names], axis=1)
 
+    def with_map_parameter(self, number: int, values: Floats) -> Self | None:
+        """Return the system with other values (lanes,) of a column of `map_parameters`.
+
+        None if the column is no parameter of its own.
+        """
+        names = [name for name in self._parameters() if name not in self.unit_inputs]
+        return self.replace(**{names[number]: values})
+
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
         return ()

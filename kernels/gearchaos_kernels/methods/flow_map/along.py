@@ -9,7 +9,8 @@ from gearchaos_kernels.compilation import evaluator
 from gearchaos_kernels.memory.block_memory import aligned_memory, fill_lane
 from gearchaos_kernels.memory.rows import rows
 from gearchaos_kernels.methods.flow_map.layout import TERMS, Layout, layout, layout_of
-from gearchaos_kernels.methods.flow_map.store import make_tables, maps_of, sharing
+from gearchaos_kernels.methods.flow_map.making import make_tables
+from gearchaos_kernels.methods.flow_map.store import maps_of, sharing
 from gearchaos_kernels.models.interfaces import half_clearances, inputs_of, mean_gaps
 from gearchaos_kernels.plan import Floats, Plan
 from gearchaos_kernels.scene import Scene
@@ -73,7 +74,7 @@ def _pieces(
     found: list[Floats | None] = []
     of_group = {}
     for lane in first:
-        maps, places = maps_of(system.of([lane]), steps, scene, plan.map_bytes)
+        maps, places = maps_of(system.of([lane]), steps, scene, plan.map_bytes, plan.interpolated)
         of_group[group[lane]] = maps, places[:, 0]
     for lane, number in enumerate(numbers):
         maps, (made, begin) = of_group[group[lane]]

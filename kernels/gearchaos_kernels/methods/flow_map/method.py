@@ -56,7 +56,8 @@ def prepare(system: Any, plan: Plan, scene: Scene, periods: Integers) -> Iterato
         in_groups, first, counts = np.arange(lanes), np.zeros(1, np.intp), np.array([lanes])
     done = 0
     while done < first.size:
-        maps, places = maps_of(system.of(in_groups[first[done:]]), steps, scene, plan.map_bytes)
+        some = system.of(in_groups[first[done:]])
+        maps, places = maps_of(some, steps, scene, plan.map_bytes, plan.interpolated)
         lanes_of = counts[done : done + places.shape[1]]
         order = in_groups[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.memory.rows import STRIDE, rows_of
 from gearchaos_kernels.methods.flow_map.layout import layout_of
+from gearchaos_kernels.methods.flow_map.making import MOST_MAP_STEPS, make_tables
 from gearchaos_kernels.methods.flow_map.sets import KNOWN
 from gearchaos_kernels.methods.flow_map.store import (
-    MOST_MAP_STEPS,
     SETS_VISITED,
     fewest_steps,
-    make_tables,
     sharing,
     which_maps,
 )

@@ -30,20 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.methods.flow_map.interpolation import interpolated
 from gearchaos_kernels.methods.flow_map.layout import MOST_SETS_IN_ADVANCE, layout_of
-from gearchaos_kernels.methods.flow_map.series import (
-    ORDER,
-    TAIL,
-    differentiate,
-    make_maps,
-)
+from gearchaos_kernels.methods.flow_map.making import MOST_MAP_STEPS, make_tables
 from gearchaos_kernels.methods.substeps import multiple_of
 from gearchaos_kernels.plan import MAP_BYTES, Floats, Plan
 from gearchaos_kernels.scene import Scene, provider_of
 from gearchaos_kernels.turns import in_turn
-
-MOST_MAP_STEPS = 4096
-"""Largest number of steps per period up to which it is doubled."""
 
 MAKING, READING, MOVING = 11_000.0, 15.0, 2.5
 """Time to make the maps of a step, to read them, and to move one lane by them, in RK4 steps.
@@ -160,16 +153,24 @@ _kept = _Kept(0)
 
 @in_turn
 def maps_of(
-    system: Any, steps: int, scene: Scene, map_bytes: int = MAP_BYTES
+    system: Any, steps: int, scene: Scene, map_bytes: int = MAP_BYTES, along: int = -1
 ) -> tuple[Floats, NDArray[np.intp]]:
     """Return the maps of the first lanes of a system, as many as fit into the memory.
 
     Also returns an array of shape (2, lanes): the steps per period of each lane, a multiple of
-    those requested, and the place of its maps. The maps are kept for later calls.
+    those requested, and the place of its maps. The maps are kept for later calls. ``along``: see
+    `Plan.interpolated`.
     """
     global _kept
     scene = scene.bare()
-    name = (steps, type(scene.model), scene.model, *which_maps(scene), system.map_constants())
+    name = (
+        steps,
+        type(scene.model),
+        scene.model,
+        *which_maps(scene),
+        system.map_constants(),
+        along,
+    )
     names = [(name, row.tobytes()) for row in system.map_parameters()]
     done, step_size = 0, layout_of(scene).step_size
     while done < len(names):
@@ -178,7 +179,7 @@ def maps_of(
         most = map_bytes // (32 * made_last * step_size) if made_last else 1
         some = range(done, min(done + max(1, min(LANES, most)), len(names)))
         new = [number for number in some if names[number] not in _kept.places]
-        made = _make(system.of(new), steps, scene) if new else []
+        made = _make(system.of(new), steps, scene, along, name) if new else []
         size = sum(maps.size for maps in made)
         if _kept.used + size > min(_kept.table.size, max(size, map_bytes // 8)):
             if done:
@@ -192,14 +193,23 @@ def maps_of(
     return _kept.table, np.array([_kept.places[name] for name in names[:done]], dtype=np.intp).T
 
 
-def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
+def _make(
+    system: Any, steps: int, scene: Scene, along: int = -1, name: Hashable = None
+) -> list[Floats]:
     """Compute the maps of lanes, each of shape (steps, size of a step), with enough steps.
 
-    If not even `MOST_MAP_STEPS` suffice, the maps are NaN.
+    If not even `MOST_MAP_STEPS` suffice, the maps are NaN. ``along`` and ``name``: see
+    `interpolated`.
     """
     place = layout_of(scene)
-    made = [np.full((steps, place.step_size), np.nan)] * system.lanes
+    made = [np.full((0, 0), np.nan)] * system.lanes
     left, count = np.arange(system.lanes), steps
+    if along >= 0:
+        between = interpolated(system, steps, scene, along, name)
+        made = [one if given is None else given for one, given in zip(made, between, strict=True)]
+        left = np.array([number for number in left if between[number] is None], dtype=np.intp)
+    for number in left:
+        made[number] = np.full((steps, place.step_size), np.nan)
     while left.size and count <= max(steps, MOST_MAP_STEPS):
         sets = np.tile(np.arange(place.branches), (left.size, 1))
         tables, converged, finite = make_tables(system.of(left), sets, count, scene)
@@ -208,34 +218,3 @@ def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
         left = left[~converged & finite]
         count *= 2
     return made
-
-
-def make_tables(
-    system: Any, sets: NDArray[np.intp], steps: int, scene: Scene
-) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Compute the maps of lanes for some sets of branches, ``sets`` (lanes, sets in a step).
-
-    Returns them, shape (lanes, steps, size of a step), whether the series of each lane converge,
-    and whether its coefficients are finite.
-    """
-    place, model = layout_of(scene), provider_of(scene.model)
-    inputs = np.ascontiguousarray(model.maps.inputs(scene.model))
-    system, lanes = system.of_unit_inputs(), system.lanes
-    coefficients = system.coefficients(system.mesh_period / steps)
-    tables, tails = np.zeros((lanes, steps, place.step_size)), np.zeros(lanes)
-    edges = system.wave_values(2.0 * np.pi / steps * np.arange(steps + 1))
-    tables[:, :, : place.waves] = edges[:-1]
-    tables[:, :, place.waves : 2 * place.waves] = edges[1:]
-    width = place.states + 1 + place.waves + place.elements
-    matrices = np.zeros((lanes, place.states + place.elements, width))
-    dampers = np.zeros((lanes, place.elements, width - place.elements + 1))
-    seen = max(0, place.signals - place.elements)
-    # The last column of the observed signals is their constant part.
-    observed = np.zeros((lanes, seen, width - place.elements + 1))
-    traced = observed, np.zeros((lanes, place.elements, 3))
-    differentiate(coefficients, matrices, dampers, traced, scene)
-    engaged = 1.0 - (sets[:, :, np.newaxis] >> np.arange(place.elements)) % 2
-    elements_on = engaged, dampers, model.stiffness(scene.model, coefficients), *traced
-    forcing = system.wave_series(steps, ORDER)
-    make_maps(matrices, elements_on, inputs, forcing, tables, tails, place)
-    return tables, tails < TAIL, np.isfinite(coefficients).all(axis=1)

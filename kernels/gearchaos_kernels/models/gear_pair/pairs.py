@@ -234,6 +234,12 @@ class GearPairs(LaneSystem):
         groups = np.array([getattr(self.groups, name) for name in _MAP_GROUPS]).T
         return np.concatenate([groups, self._own_waves()], axis=1)
 
+    def with_map_parameter(self, number: int, values: Floats) -> Self | None:
+        """Return the pairs with other values (lanes,) of a column of `map_parameters`, or None."""
+        if number >= len(_MAP_GROUPS):
+            return None
+        return self.replace(groups=self.groups._replace(**{_MAP_GROUPS[number]: values}))
+
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
         constants = self.physical, self.damped_in_contact_only

@@ -287,6 +287,10 @@ class LinearSystems(LaneSystem):
         flat = [one.reshape(self.lanes, math.prod(one.shape[1:])) for one in numbers]
         return np.concatenate(flat, axis=1)
 
+    def with_map_parameter(self, _number: int, _values: Floats) -> Self | None:
+        """Return None: what the columns of `map_parameters` are depends on the matrices."""
+        return None
+
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
         return self.orders
