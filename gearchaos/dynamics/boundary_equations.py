@@ -132,9 +132,14 @@ class Equations(NamedTuple):
         return run(self.correcting(guess, direction, reference), passed_of)
 
     def correcting(
-        self, guess: Floats, direction: Floats, reference: Reference, nearly: float = NEARLY
+        self,
+        guess: Floats,
+        direction: Floats,
+        reference: Reference,
+        nearly: float = NEARLY,
+        reach: float = 1.0,
     ) -> Following[OnBoundary | None]:
-        """Return the search of `corrected`.
+        """Return the search of `corrected`; None also where it leads farther away than a reach.
 
         ``nearly``: length of a step after which a point may be accepted without another orbit; its
         multipliers are those before the step.
@@ -164,7 +169,7 @@ class Equations(NamedTuple):
             near = length < (CONTRACTION * last if moves else STRAIGHT)
             slopes = slopes if near or length < SHORT else None
             place, last = place + step, length
-            if np.linalg.norm(place - guess) > 1.0:
+            if np.linalg.norm(place - guess) > reach:
                 return None
         return None
 

@@ -24,6 +24,9 @@ from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST,
 START_STEP, SHORT_STEP, LONGEST, SHORTEST = 0.04, 5e-3, 0.25, 1e-5
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
+SIDE_BY_SIDE, MOST_AHEAD = 16, 2
+"""About how many points are searched side by side, and the most ahead of one point."""
+
 SMOOTH, TURN = 0.9, 0.3
 """Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
 
@@ -109,27 +112,57 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
     """Follow a half up to its end, or until it meets another one."""
     points, step = half.points, START_STEP
     while not half.end and half.met is None:
-        here = points[-1]
-        trial, leaves = yield from _next(equations, points, step)
+        going = sum(not one.end and one.met is None for one in halves)
+        many = min(max(SIDE_BY_SIDE // going, 1), MOST_AHEAD)
+        trials, leaves = yield from _next(equations, points, step * np.arange(1.0, many + 1.0))
         if half.met is not None:
             return
-        if trial is None or trial.tangent @ here.tangent < SMOOTH:
-            step /= 2.0
-            half.end = _why_lost(equations, here) if step < SHORTEST else ""
-            continue
-        if here.halfway.size and here.halfway @ trial.halfway <= 0.0:
-            near = np.max(np.abs(here.halfway)) < HALF_RETURN
-            half.end, step = (HALVING if near else ""), step / 2.0
-            continue
-        met = _met(here, trial, half, halves)
-        if met is not None:
-            half.met, met.met, met.end = met, half, ""
-            return
-        length = float(np.linalg.norm(trial.place - here.place))
-        points += [trial] if length > 0.0 else []
-        half.end = EDGE if leaves else _end_at(points)
-        turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
-        step = min(length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0), LONGEST)
+        before = len(points)
+        for number, trial in enumerate(trials):
+            at_edge = leaves and number == len(trials) - 1
+            longer = _joined(half, halves, trial, at_edge)
+            if longer is None:
+                break
+            step = min(longer, LONGEST)
+            if half.end or half.met is not None:
+                return
+        if len(points) == before:
+            here, step = points[-1], step / 2.0
+            if trials[0] is not None and _passes_half(here, trials[0]):
+                half.end = HALVING if _nearly_half(here) else ""
+            elif step < SHORTEST:
+                half.end = _why_lost(equations, here)
+
+
+def _joined(
+    half: _Half, halves: list[_Half], trial: OnBoundary | None, at_edge: bool
+) -> float | None:
+    """Join a point to a half unless another half is met before it; return the next step.
+
+    None if the point does not continue the half.
+    """
+    points, here = half.points, half.points[-1]
+    if trial is None or trial.tangent @ here.tangent < SMOOTH or _passes_half(here, trial):
+        return None
+    met = _met(here, trial, half, halves)
+    if met is not None:
+        half.met, met.met, met.end = met, half, ""
+        return 0.0
+    length = float(np.linalg.norm(trial.place - here.place))
+    points += [trial] if length > 0.0 else []
+    half.end = EDGE if at_edge else _end_at(points)
+    turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
+    return length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0)
+
+
+def _passes_half(here: OnBoundary, trial: OnBoundary) -> bool:
+    """Whether the orbit of half the period lies between two points: beyond it, phases swap."""
+    return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
+
+
+def _nearly_half(here: OnBoundary) -> bool:
+    """Whether an orbit nearly coincides with one of half the period."""
+    return bool(here.halfway.size and np.max(np.abs(here.halfway)) < HALF_RETURN)
 
 
 def _end_at(points: list[OnBoundary]) -> str:
@@ -166,7 +199,7 @@ def _met(here: OnBoundary, trial: OnBoundary, half: _Half, halves: list[_Half]) 
 
 def _why_lost(equations: Equations, here: OnBoundary) -> str:
     """Return why no further point is found."""
-    if here.halfway.size and np.max(np.abs(here.halfway)) < HALF_RETURN:
+    if _nearly_half(here):
         return HALVING
     if equations.kind == GRAZING:
         return NO_EXTREME
@@ -175,24 +208,41 @@ def _why_lost(equations: Equations, here: OnBoundary) -> str:
 
 
 def _next(
-    equations: Equations, points: list[OnBoundary], step: float
-) -> Following[tuple[OnBoundary | None, bool]]:
-    """Search the next point of a boundary, or None, and whether it lies at an edge."""
-    here = points[-1]
-    (ahead,), _ = extended(points[-2:], np.array([step]))
-    guess, direction = among_columns(equations, ahead, here.tangent, 0.5 * step)
-    outside = (guess < 0.0) | (guess > 1.0)
+    equations: Equations, points: list[OnBoundary], distances: Floats
+) -> Following[tuple[list[OnBoundary | None], bool]]:
+    """Search the next points of a boundary, and whether the last of them lies at an edge.
+
+    ``distances``: those at which points are predicted. A point is None if it is not found near its
+    prediction.
+    """
+    here, leaves = points[-1], False
+    searches: list[Following[OnBoundary | None]] = []
+    gaps = np.diff(distances, prepend=0.0)
+    for guess, tangent, gap, step in zip(
+        *extended(points[-2:], distances), gaps.tolist(), distances.tolist(), strict=True
+    ):
+        guess, direction = among_columns(equations, guess, tangent, 0.5 * gap)
+        outside = _outside(guess)
+        leaves = bool(outside.any())
+        if leaves:
+            searches.append(_at_edge(equations, here, guess, step, outside))
+            break
+        reach = ASIDE * gap
+        searches.append(equations.correcting(guess, direction, here.reference, reach=reach))
+    trials = yield from together(searches)
+    for number, trial in enumerate(trials[: len(trials) - leaves]):
+        if trial is not None and _outside(trial.place).any():
+            outside, step = _outside(trial.place), float(distances[number])
+            edge = yield from _at_edge(equations, here, trial.place, step, outside)
+            return [*trials[:number], edge], True
+    return trials, leaves
+
+
+def _outside(place: Floats) -> Mask:
+    """Return which components of a place (states + 2,) lie outside the ranges."""
+    outside = (place < 0.0) | (place > 1.0)
     outside[:-PARAMETERS] = False
-    if not outside.any():
-        trial = yield from equations.correcting(guess, direction, here.reference)
-        if trial is None or np.linalg.norm(trial.place - guess) > ASIDE * step:
-            return None, False
-        if np.all((trial.shares >= 0.0) & (trial.shares <= 1.0)):
-            return trial, False
-        outside = (trial.place < 0.0) | (trial.place > 1.0)
-        outside[:-PARAMETERS] = False
-        guess = trial.place
-    return (yield from _at_edge(equations, here, guess, step, outside)), True
+    return np.asarray(outside)
 
 
 def fixed_direction(equations: Equations, tangent: Floats) -> Floats:
