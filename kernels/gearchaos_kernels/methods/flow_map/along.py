@@ -72,10 +72,13 @@ def _pieces(
     group = sharing(system)
     _, first = np.unique(group, return_index=True)
     found: list[Floats | None] = []
-    of_group = {}
-    for lane in first:
-        maps, places = maps_of(system.of([lane]), steps, scene, plan.map_bytes, plan.interpolated)
-        of_group[group[lane]] = maps, places[:, 0]
+    of_group, done = {}, 0
+    while done < first.size:
+        some = system.of(first[done:])
+        maps, places = maps_of(some, steps, scene, plan.map_bytes, plan.interpolated)
+        for lane, place_of in zip(first[done:], places.T, strict=False):
+            of_group[group[lane]] = maps, place_of
+        done += places.shape[1]
     for lane, number in enumerate(numbers):
         maps, (made, begin) = of_group[group[lane]]
         found.append(_piece(maps, begin, number, sets[lane], place) if made == steps else None)

@@ -83,23 +83,26 @@ def interpolated(
         if not value > 0.0:
             found.append(None)
             continue
-        piece = _piece_at(system.of([lane]), value, (steps, scene, along), (name, others[lane]))
+        key = name, others[lane].tobytes()
+        piece = _piece_at(system, lane, value, (steps, scene, along), key)
         found.append(None if piece is None else piece.at(value))
     return found
 
 
 def _piece_at(
-    lane: Any, value: float, how: tuple[int, Scene, int], names: tuple[Hashable, Floats]
+    system: Any, lane: int, value: float, how: tuple[int, Scene, int], name: Hashable
 ) -> Piece | None:
-    """Return the piece that contains a value of the parameter of a lane, or None."""
-    name, others = names
+    """Return the piece that contains a value of the parameter of a lane, or None.
+
+    ``name``: what the maps depend on besides this parameter.
+    """
     for division in range(DIVISIONS + 1):
         pieces = PIECES * 2**division
         number = int(np.floor(pieces * np.log2(value)))
-        key = name, others.tobytes(), division, number
+        key = name, division, number
         if key not in _pieces:
             ends = 2.0 ** (number / pieces), 2.0 ** ((number + 1) / pieces)
-            _keep(key, _made(lane, ends, *how))
+            _keep(key, _made(system.of([lane]), ends, *how))
         found = _pieces[key]
         if found is not None:
             return found

@@ -62,9 +62,12 @@ def fewest_steps(plan: Plan) -> int:
 def sharing(system: Any) -> NDArray[np.intp]:
     """Return the number of the group of each lane, shape (lanes,); a group shares its maps."""
     rows = system.map_parameters()
-    if (rows == rows[:1]).all():
+    (differ,) = np.nonzero((rows != rows[:1]).any(axis=0))
+    if not differ.size:
         return np.zeros(len(rows), dtype=np.intp)
-    _, number = np.unique(rows, axis=0, return_inverse=True)
+    # The rows have the order of their first columns that differ; one column is sorted faster.
+    some = rows[:, differ[0]] if differ.size == 1 else rows[:, differ]
+    _, number = np.unique(some, axis=0, return_inverse=True)
     return number.reshape(-1).astype(np.intp)
 
 
