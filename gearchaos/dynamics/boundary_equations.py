@@ -33,6 +33,9 @@ STRAIGHT = 1e-5
 SHORT = 1e-10
 """Length of a Newton step below which a point is accepted."""
 
+LAST = 1e-12
+"""Predicted length of the next Newton step below which a point is accepted without it."""
+
 NEARLY = 1e-7
 """Length of a Newton step after which a point may be accepted without another orbit."""
 
@@ -154,9 +157,9 @@ class Equations(NamedTuple):
             slopes, step, defect = passed.slopes, passed.step, passed.defect
             length = float(np.linalg.norm(step))
             closed = max(CLOSED, ROUNDING * float(np.max(np.abs(passed.monodromy))))
-            # In the second case the next step would be shorter than SHORT.
+            # In the second case the next step would be shorter than LAST.
             if (length <= SHORT and float(np.max(np.abs(defect[:-1]))) <= closed) or (
-                length <= nearly and length**2 <= SHORT * last
+                length <= nearly and length**2 <= LAST * last
             ):
                 place = place + step
                 if np.linalg.norm(place - where) > NEAR_ENOUGH:
