@@ -27,6 +27,9 @@ from gearchaos_kernels.methods.flow_map.quadrature import PLACES, POINTS, WEIGHT
 from gearchaos_kernels.methods.flow_map.vectors import _inputs, _on_branches, _Writer
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 
+_TOGETHER = 3
+"""Linear functions that are summed at once: 16 registers hold their sums and the next factors."""
+
 _ITERATIONS = 2
 """Steps of Halley's method, which triples the number of right digits."""
 
@@ -108,12 +111,15 @@ def _linear(first: str, row: str, count: int) -> Any:
 
         def apply(w, vector, branch_maps, mask):
             inputs = w.rows(vector, _inputs(scene.scene))
-            for number in range(count):
-                factors = [
-                    (column, w.spread(branch_maps, begin + column * count + number))
-                    for column in range(place.columns)
-                ]
-                w.put(w.sum(factors, inputs), vector, target + number, mask)
+            for some in range(0, count, _TOGETHER):
+                sums = [None] * min(_TOGETHER, count - some)
+                for column, given in enumerate(inputs):
+                    at = begin + column * count + some
+                    for number, total in enumerate(sums):
+                        factor = w.spread(branch_maps, at + number)
+                        sums[number] = w.multiply_add(factor, given, total)
+                for number, total in enumerate(sums):
+                    w.put(total, vector, target + some + number, mask)
 
         given = memory, types.intp, maps, types.intp, scene
         return types.void(*given), _on_branches(scene.scene, apply)
