@@ -28,7 +28,7 @@ from gearchaos_kernels.methods.flow_map.vectors import _inputs, _on_branches, _W
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 
 _TOGETHER = 3
-"""Linear functions that are summed at once: 16 registers of four numbers hold all that they need."""
+"""Linear functions summed at once: 16 registers of four numbers hold all that they need."""
 
 _ITERATIONS = 2
 """Steps of Halley's method, which triples the number of right digits."""
