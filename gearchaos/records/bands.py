@@ -8,7 +8,7 @@ visits the whole curve.
 
 import numpy as np
 
-from gearchaos.arrays import Counts, Floats, Mask
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.records.period import LONGEST_PERIOD, coordinate_scale
 
 STRIDES = (2, 3, 5, 7)
@@ -25,6 +25,9 @@ NEIGHBOURS = 4
 
 PORTION = 64
 """Points compared at a time: most chaotic sections are found to have one band early."""
+
+ROUNDING = 1e-12
+"""Bound on rounding in the square of a distance, relative to the largest square of a point."""
 
 EXPLAINED = 0.1
 """Share of variance above which subsequences may be bands; for 13 random ones it is 0.02."""
@@ -87,7 +90,8 @@ def _may_have_bands(section: Floats) -> Mask:
             break
         dealt = series[rest, :, -turns * stride :]
         means = [np.mean(dealt[:, :, first::stride], axis=2) for first in range(stride)]
-        variance, between = np.var(dealt, axis=2), np.var(means, axis=0)
+        between = np.var(means, axis=0)
+        variance = np.var(dealt, axis=2)
         found[rest] = np.any(between > EXPLAINED * variance, axis=1)
     return found
 
@@ -95,23 +99,40 @@ def _may_have_bands(section: Floats) -> Mask:
 def _common_step(points: Floats) -> int:
     """Return the greatest common divisor of the steps in time between nearest neighbours."""
     every, common = np.arange(points.shape[0]), 0
-    coordinates = np.ascontiguousarray(points.T)
+    centred = points - np.mean(points, axis=0)
+    squares = np.sum(centred**2, axis=1)
+    others = np.vstack([centred.T, squares])
+    own = np.hstack([-2.0 * centred, np.ones((every.size, 1))])
+    error = ROUNDING * np.max(squares)
     for some in np.split(every, every[::PORTION][1:]):
-        apart = np.zeros((some.size, every.size))
-        along = np.empty_like(apart)
-        for coordinate in coordinates:
-            np.subtract.outer(coordinate[some], coordinate, out=along)
-            apart += np.square(along, out=along)
-        rows, nearest = np.arange(some.size), some
-        for _ in range(NEIGHBOURS):
-            # Not the point itself, nor the neighbour before.
-            apart[rows, nearest] = np.inf
-            # The smallest element is found much faster than a partition.
-            nearest = np.argmin(apart, axis=1)
-            common = int(np.gcd.reduce(np.abs(nearest - some), initial=common))
+        # The squares of the distances, less the same number for all neighbours of a point.
+        steps, distances = _nearest(own[some] @ others, some, NEIGHBOURS + 1)
+        unsure = ~(distances[-1] - distances[-2] > error)
+        if unsure.any():
+            exact = np.zeros((np.count_nonzero(unsure), every.size))
+            for coordinate in points.T:
+                exact += np.subtract.outer(coordinate[some[unsure]], coordinate) ** 2
+            steps[:-1, unsure] = _nearest(exact, some[unsure], NEIGHBOURS)[0]
+        common = int(np.gcd.reduce(steps[:-1], axis=None, initial=common))
         if common == 1:
             break
     return common
+
+
+def _nearest(apart: Floats, some: Integers, count: int) -> tuple[Integers, Floats]:
+    """Return steps in time to the nearest neighbours of some points, and their distances.
+
+    ``apart`` (points, all points) is overwritten. Both results have the shape (count, points).
+    """
+    rows, nearest = np.arange(some.size), some
+    steps, distances = np.empty((count, some.size), np.intp), np.empty((count, some.size))
+    for number in range(count):
+        # Not the point itself, nor the neighbour before.
+        apart[rows, nearest] = np.inf
+        # The smallest element is found much faster than a partition.
+        nearest = np.argmin(apart, axis=1)
+        steps[number], distances[number] = np.abs(nearest - some), apart[rows, nearest]
+    return steps, distances
 
 
 def smooth_weights(points: int) -> Floats:

@@ -15,6 +15,9 @@ POINTS_NEEDED = RETURNS * LONGEST_PERIOD
 TOLERANCE = 1e-5
 """Distance, relative to the scale of a state, within which a section returns."""
 
+PORTION = 64
+"""Lanes compared at a time: their points fit into the cache."""
+
 _SMALLEST_SCALE = 1e-3
 """Smallest scale of a state, relative to the largest state."""
 
@@ -49,9 +52,13 @@ def return_distances(section: Floats) -> Floats:
     distances = np.full((points.shape[0], LONGEST_PERIOD), np.nan)
     if points.size == 0:
         return distances
-    points = points / coordinate_scale(points)[:, np.newaxis]
-    for n in range(1, min(LONGEST_PERIOD, points.shape[1] // RETURNS) + 1):
-        distances[:, n - 1] = np.max(np.abs(points[:, n:] - points[:, :-n]), axis=(1, 2))
+    longest = min(LONGEST_PERIOD, points.shape[1] // RETURNS)
+    for first in range(0, points.shape[0], PORTION):
+        some = slice(first, first + PORTION)
+        scaled = points[some] / coordinate_scale(points[some])[:, np.newaxis]
+        for n in range(1, longest + 1):
+            apart = scaled[:, n:] - scaled[:, :-n]
+            distances[some, n - 1] = np.max(np.abs(apart, out=apart), axis=(1, 2))
     return distances
 
 

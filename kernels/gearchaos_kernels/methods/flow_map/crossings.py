@@ -107,6 +107,7 @@ def share_maps(aside, lanes, scene):
 def trace_to_crossing(aside, maps, maps_at, scene):
     """Accumulate the signals of eight lanes from the last crossing of each to the next one."""
     place, at_rows, first = layout(scene), aside_rows(scene), method_rows(scene).piece
+    crosses = False
     for n in range(VECTOR):
         after, moment = aside[at_rows.after * STRIDE + n], NEVER
         for element in range(place.elements):
@@ -114,7 +115,9 @@ def trace_to_crossing(aside, maps, maps_at, scene):
             moment = min(moment, aside[row * STRIDE + n])
         aside[first * STRIDE + n] = after
         aside[(first + 1) * STRIDE + n] = moment if moment <= 1.0 else after
-    trace_piece(aside, 0, maps, maps_at, scene)
+        crosses |= moment <= 1.0
+    if crosses:
+        trace_piece(aside, 0, maps, maps_at, scene)
 
 
 @scalar

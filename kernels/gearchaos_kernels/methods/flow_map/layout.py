@@ -10,6 +10,7 @@ from gearchaos_kernels.compilation import CACHE_LINE
 from gearchaos_kernels.memory.block_memory import numbers_of
 from gearchaos_kernels.memory.rows import constants, rows_of
 from gearchaos_kernels.memory.tuples import zeros_of
+from gearchaos_kernels.methods.flow_map.quadrature import POINTS
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.recorders.loads import signals_of
 from gearchaos_kernels.scene import Scene, provider_of
@@ -71,6 +72,8 @@ class Layout(NamedTuple):
     signal, signals : int
         Where the polynomials of the signals begin within the maps of a set of branches, and their
         number: forces and observed signals in a scene that traces them, otherwise 0.
+    values : int
+        Where the values of the signals at the `POINTS` points of a whole step begin.
     size, step_size : int
         Size of the maps of one set of branches, and of all numbers of a step.
     waves, bounds, bound_size, header : int
@@ -94,6 +97,7 @@ class Layout(NamedTuple):
     damper: int
     signal: int
     signals: int
+    values: int
     size: int
     step_size: int
     waves: int
@@ -127,7 +131,8 @@ def layout_of(scene: Scene) -> Layout:
     damper = switch + elements * TERMS * width
     signal = damper + (elements * TERMS * width if scene.jumps else 0)
     signals = signals_of(scene) if scene.traced else 0
-    size = signal + signals * columns * TERMS
+    values = signal + signals * columns * TERMS
+    size = values + signals * columns * POINTS
     sets = 2**elements if scene.resolved else 1
     on_demand = int(sets > MOST_SETS_IN_ADVANCE)
     branches = 1 if on_demand else sets
@@ -150,6 +155,7 @@ def layout_of(scene: Scene) -> Layout:
         damper=damper,
         signal=signal,
         signals=signals,
+        values=values,
         size=size,
         step_size=header + branches * size,
         waves=waves,
@@ -302,6 +308,8 @@ class MethodRows(NamedTuple):
         Constant parts of the signals, which have no column in the maps.
     terms : int
         `TERMS` rows of a signal along the step.
+    values : int
+        `POINTS` rows of the values of a signal along a piece, without its constant part.
     piece : int
         The moments at which a smooth piece of the signals begins and ends.
     total : int
@@ -313,6 +321,7 @@ class MethodRows(NamedTuple):
     maps: int
     means: int
     terms: int
+    values: int
     piece: int
     total: int
 
@@ -328,9 +337,10 @@ def _method_rows(place: Layout, first: int) -> MethodRows:
     maps = margins + place.elements
     means = maps + place.on_demand
     terms = means + place.signals
-    piece = terms + (TERMS if place.signals else 0)
+    values = terms + (TERMS if place.signals else 0)
+    piece = values + (POINTS if place.signals else 0)
     end = piece + (2 if place.signals else 0)
-    return MethodRows(first, margins, maps, means, terms, piece, end - first)
+    return MethodRows(first, margins, maps, means, terms, values, piece, end - first)
 
 
 def rows_needed(scene: Scene) -> int:

@@ -10,12 +10,16 @@ import numpy as np
 from gearchaos_kernels.compilation import compact, part, scalar
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.methods.flow_map.layout import TERMS, layout
+from gearchaos_kernels.methods.flow_map.quadrature import PLACES, POINTS
 from gearchaos_kernels.models.interfaces import (
     elements_at,
     mobility_forces,
     observed_at,
     point_of_waves,
 )
+
+_POWERS = np.vander(np.array(PLACES), TERMS, increasing=True)
+"""Matrix from the terms of a signal to its values at the points of a step."""
 
 APART, ENGAGED, SHARE = range(3)
 """Columns of the array ``forces`` of `differentiate_signals`."""
@@ -86,7 +90,7 @@ def add_dampers(springs, gaps, engaged, forces):
 
 @part
 def write_signals(along, first, target, place):
-    """Write signals along some steps into a table, from number ``first`` on.
+    """Write terms and values of signals along some steps into a table, from number ``first`` on.
 
     ``along``: their terms, shape (terms * signals, columns, steps).
     """
@@ -94,9 +98,15 @@ def write_signals(along, first, target, place):
     table, begin = target
     signals = along.shape[0] // TERMS
     for at in range(along.shape[2]):
-        piece = table[at, begin + place.signal :]
+        piece = table[at, begin:]
         for signal in range(signals):
             for column in range(place.columns):
-                row = ((first + signal) * place.columns + column) * TERMS
+                number = (first + signal) * place.columns + column
                 for term in range(TERMS):
-                    piece[row + term] = along[term * signals + signal, column, at]
+                    part = along[term * signals + signal, column, at]
+                    piece[place.signal + number * TERMS + term] = part
+                for point in range(POINTS):
+                    value = 0.0
+                    for term in range(TERMS):
+                        value += _POWERS[point, term] * along[term * signals + signal, column, at]
+                    piece[place.values + number * POINTS + point] = value

@@ -7,28 +7,28 @@ turning point beside it is searched by Halley's method. Smallest values are thos
 signal.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.rows import STRIDE, VECTOR, constants, rows
-from gearchaos_kernels.memory.vector_code import FLAGS
+from gearchaos_kernels.memory.vector_code import FLAGS, INTEGER
 from gearchaos_kernels.methods.flow_map.layout import (
     TERMS,
+    MethodRows,
     layout,
     layout_of,
     method_rows,
     method_rows_of,
 )
+from gearchaos_kernels.methods.flow_map.quadrature import PLACES, POINTS, WEIGHTS
 from gearchaos_kernels.methods.flow_map.vectors import _inputs, _on_branches, _Writer
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, accumulated_of
 
-_POINTS = 9
-"""Number of Gauss-Lobatto points. The rule is exact up to the last term of a signal."""
+_TOGETHER = 3
+"""Linear functions summed at once: 16 registers of four numbers hold all that they need."""
 
 _ITERATIONS = 2
 """Steps of Halley's method, which triples the number of right digits."""
@@ -39,17 +39,6 @@ _NEAR = 0.1
 The maps of a step converge only if a step is shorter than about half a cycle of the motion. Between
 two of the points a crest then exceeds the larger value by less than half of this share.
 """
-
-
-def _gauss_lobatto(count: int) -> tuple[list[float], list[float]]:
-    """Return points and weights of the Gauss-Lobatto rule from -1 to 1."""
-    last = np.polynomial.legendre.Legendre.basis(count - 1)
-    points = np.concatenate([[-1.0], np.sort(last.deriv().roots().real), [1.0]])
-    weights = 2.0 / (count * (count - 1) * last(points) ** 2)
-    return points.tolist(), weights.tolist()
-
-
-_PLACES, _WEIGHTS = _gauss_lobatto(_POINTS)
 
 
 class Accumulated(NamedTuple):
@@ -76,7 +65,26 @@ def trace_block(memory, slots, maps, maps_at, scene):
                 stays = memory[rows(scene).suspect * STRIDE + n] == 0.0
             memory[first * STRIDE + n] = -1.0
             memory[(first + 1) * STRIDE + n] = 1.0 if stays else -1.0
-        trace_piece(memory, slot, maps, maps_at, scene)
+        trace_step(memory, slot, maps, maps_at, scene)
+
+
+@scalar
+def trace_step(memory, slot, maps, maps_at, scene):
+    """Accumulate the signals of eight lanes along a whole step, or not those with empty pieces.
+
+    The maps give the values of the signals directly. Polynomials are needed near extremes only.
+    """
+    for signal in range(layout(scene).signals):
+        compute_values(memory, slot, maps, maps_at + signal * layout(scene).columns * POINTS, scene)
+        if add_values(memory, slot, signal, scene) != 0:
+            raise_in_step(memory, slot, signal, maps, maps_at, scene)
+
+
+@part
+def raise_in_step(memory, slot, signal, maps, maps_at, scene):
+    """Raise the extremes of a signal of eight lanes by its turning points in a whole step."""
+    compute_signal(memory, slot, maps, maps_at + signal * layout(scene).columns * TERMS, scene)
+    raise_extremes(memory, slot, signal, scene)
 
 
 @part
@@ -84,86 +92,158 @@ def trace_piece(memory, slot, maps, maps_at, scene):
     """Accumulate the signals of eight lanes along a piece of a step; it may be empty."""
     for signal in range(layout(scene).signals):
         compute_signal(memory, slot, maps, maps_at + signal * layout(scene).columns * TERMS, scene)
-        add_piece(memory, slot, signal, scene)
+        evaluate_signal(memory, slot, scene)
+        if add_values(memory, slot, signal, scene) != 0:
+            raise_extremes(memory, slot, signal, scene)
+
+
+def _linear(first: str, row: str, count: int) -> Any:
+    """Return an intrinsic that stores ``count`` linear functions of the factors of a map.
+
+    ``first``: the field of `Layout` with the place of their coefficients; ``row``: the field of
+    `MethodRows` with their first row.
+    """
+
+    @intrinsic
+    def compute(_typing, memory, slot, maps, maps_at, scene):
+        place = layout_of(scene.scene)
+        begin, target = getattr(place, first), getattr(method_rows_of(scene.scene), row)
+
+        def apply(w, vector, branch_maps, mask):
+            inputs = w.rows(vector, _inputs(scene.scene))
+            for some in range(0, count, _TOGETHER):
+                sums = [None] * min(_TOGETHER, count - some)
+                for column, given in enumerate(inputs):
+                    at = begin + column * count + some
+                    for number, total in enumerate(sums):
+                        factor = w.spread(branch_maps, at + number)
+                        sums[number] = w.multiply_add(factor, given, total)
+                for number, total in enumerate(sums):
+                    w.put(total, vector, target + some + number, mask)
+
+        given = memory, types.intp, maps, types.intp, scene
+        return types.void(*given), _on_branches(scene.scene, apply)
+
+    return compute
+
+
+compute_signal = _linear("signal", "terms", TERMS)
+"""Store the terms of a signal of eight lanes along the step, without its constant part.
+
+Arguments: memory, slot, maps, place of the maps of the step plus that of the signal, scene.
+"""
+
+compute_values = _linear("values", "values", POINTS)
+"""Store its values at the points of a whole step, with the same arguments."""
 
 
 @intrinsic
-def compute_signal(_typing, memory, slot, maps, maps_at, scene):
-    """Store the terms of a signal of eight lanes along the step, without its constant part."""
-    place, first = layout_of(scene.scene), method_rows_of(scene.scene).terms
-
-    def apply(w, vector, branch_maps, mask):
-        inputs = w.rows(vector, _inputs(scene.scene))
-        for term in range(TERMS):
-            factors = [
-                (column, w.spread(branch_maps, place.signal + column * TERMS + term))
-                for column in range(place.columns)
-            ]
-            w.put(w.sum(factors, inputs), vector, first + term, mask)
-
-    given = memory, types.intp, maps, types.intp, scene
-    return types.void(*given), _on_branches(scene.scene, apply)
-
-
-@intrinsic
-def add_piece(_typing, memory, slot, signal, scene):
-    """Accumulate a signal of eight lanes along a piece, whose terms have been stored."""
+def evaluate_signal(_typing, memory, slot, scene):
+    """Store the values of a signal of eight lanes at the points of a piece, from its terms."""
     place = method_rows_of(scene.scene)
-    first = accumulated_of(scene.scene)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         vector = w.element(0, arguments[1])
-        stride = ir.Constant(arguments[2].type, STRIDE)
-        mean = builder.gep(vector, [builder.mul(arguments[2], stride)])
-        signal_rows = ir.Constant(arguments[2].type, STRIDE * SIGNAL_ROWS)
-        rows = builder.gep(vector, [builder.mul(arguments[2], signal_rows)])
+        piece = _Piece(w, vector, place)
         terms = w.rows(vector, range(place.terms, place.terms + TERMS))
-        terms[0] = w.add(terms[0], w.load(mean, place.means * STRIDE))
-        begin, end = w.rows(vector, (place.piece, place.piece + 1))
-        piece = _Piece(w, terms, begin, end)
-        values = [piece.value(at) for at in piece.places]
+        for number, at in enumerate(piece.places()):
+            w.store(value_of(w, terms, at), vector, (place.values + number) * STRIDE)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, scene), generate
+
+
+@intrinsic
+def add_values(_typing, memory, slot, signal, scene):
+    """Add a piece of a signal to its integrals, and its values at the points to its extremes.
+
+    Returns the mask of those of eight lanes in which a turning point may exceed an extreme.
+    """
+    place, first = method_rows_of(scene.scene), accumulated_of(scene.scene)
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        vector, rows, mean = _of_signal(w, arguments, place.means)
+        piece = _Piece(w, vector, place)
+        values = piece.values(mean)
         for row, more in enumerate(piece.integrals(values), first + 2):
             w.store(w.add(w.load(rows, row * STRIDE), more), rows, row * STRIDE)
+        near = [
+            piece.near(values, w.load(rows, row * STRIDE), way)
+            for row, way in ((first, 1.0), (first + 1, -1.0))
+        ]
+        return builder.zext(w.bits(builder.or_(*near)), INTEGER)
+
+    return types.intp(memory, types.intp, types.intp, scene), generate
+
+
+@intrinsic
+def raise_extremes(_typing, memory, slot, signal, scene):
+    """Raise the extremes of a signal of eight lanes by its turning points on a piece."""
+    place, first = method_rows_of(scene.scene), accumulated_of(scene.scene)
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        vector, rows, mean = _of_signal(w, arguments, place.means)
+        piece = _Piece(w, vector, place)
         for row, way in ((first, 1.0), (first + 1, -1.0)):
-            piece.raise_extreme(rows, row, values, way)
+            piece.raise_extreme(rows, row, mean, way)
         return context.get_dummy_value()
 
     return types.void(memory, types.intp, types.intp, scene), generate
 
 
+def _of_signal(w: _Writer, arguments: Any, means: int) -> tuple[Any, Any, Any]:
+    """Return the addresses of eight lanes and of the rows of a signal, and its constant part.
+
+    ``arguments``: memory, slot, signal; ``means``: the row of the first constant part.
+    """
+    vector = w.element(0, arguments[1])
+    mean = w.load(w.moved(vector, arguments[2], STRIDE), means * STRIDE)
+    return vector, w.moved(vector, arguments[2], STRIDE * SIGNAL_ROWS), mean
+
+
+def value_of(w: _Writer, terms: list[Any], at: Any) -> Any:
+    """Return the values of eight polynomials at a place of each."""
+    # Even and odd terms are summed independently, so that they do not wait for each other.
+    square = w.times(at, at)
+    parts = []
+    for first in (0, 1):
+        total = terms[TERMS - 2 + first]
+        for term in range(TERMS - 4 + first, -1, -2):
+            total = w.multiply_add(total, square, terms[term])
+        parts.append(total)
+    return w.multiply_add(parts[1], at, parts[0])
+
+
 class _Piece:
-    """Generates the instructions for the polynomials of eight lanes on a piece each."""
+    """Generates the instructions for a signal of eight lanes, each on a piece of the step."""
 
-    def __init__(self, writer: _Writer, terms: list, begin: object, end: object) -> None:
-        self.w, self.terms, self.begin, self.end = writer, terms, begin, end
+    def __init__(self, writer: _Writer, vector: Any, place: MethodRows) -> None:
+        self.w, self.vector, self.place = writer, vector, place
+        self.begin, self.end = writer.rows(vector, (place.piece, place.piece + 1))
         half = writer.constant(0.5)
-        middle = writer.times(half, writer.add(begin, end))
-        self.half = writer.times(half, writer.add(end, writer.negative(begin)))
-        self.there = writer.greater(end, begin)
-        inner = [
-            writer.multiply_add(self.half, writer.constant(place), middle)
-            for place in _PLACES[1:-1]
-        ]
-        self.places = [begin, *inner, end]
+        self.middle = writer.times(half, writer.add(self.begin, self.end))
+        self.half = writer.times(half, writer.add(self.end, writer.negative(self.begin)))
+        self.there = writer.greater(self.end, self.begin)
 
-    def value(self, at: object) -> object:
-        """Return the polynomials at a place of each lane."""
-        # Even and odd terms are summed independently, so that they do not wait for each other.
-        square = self.w.times(at, at)
-        parts = []
-        for first in (0, 1):
-            total = self.terms[TERMS - 2 + first]
-            for term in range(TERMS - 4 + first, -1, -2):
-                total = self.w.multiply_add(total, square, self.terms[term])
-            parts.append(total)
-        return self.w.multiply_add(parts[1], at, parts[0])
+    def places(self) -> list[Any]:
+        """Return the points of the piece."""
+        w = self.w
+        inner = [w.multiply_add(self.half, w.constant(at), self.middle) for at in PLACES[1:-1]]
+        return [self.begin, *inner, self.end]
 
-    def integrals(self, values: list) -> list:
-        """Return six times the integrals of the polynomials and of their squares, in steps."""
+    def values(self, mean: Any) -> list[Any]:
+        """Return the values of the signal at the points, with its constant part."""
+        rows = range(self.place.values, self.place.values + POINTS)
+        return [self.w.add(value, mean) for value in self.w.rows(self.vector, rows)]
+
+    def integrals(self, values: list[Any]) -> list[Any]:
+        """Return six times the integrals of the signal and of its square, in steps."""
         w = self.w
         total, squares = None, None
-        for value, weight in zip(values, _WEIGHTS, strict=True):
+        for value, weight in zip(values, WEIGHTS, strict=True):
             # A step has length 2 in s.
             share = w.times(value, w.constant(3.0 * weight))
             total = share if total is None else w.add(total, share)
@@ -171,30 +251,45 @@ class _Piece:
         nothing = w.constant(0.0)
         return [w.choose(self.there, w.times(one, self.half), nothing) for one in (total, squares)]
 
-    def raise_extreme(self, rows: object, row: int, values: list, way: float) -> None:
-        """Store the largest value of the polynomials, or with ``way`` -1 the smallest, in a row."""
-        w, builder = self.w, self.w.builder
+    def near(self, values: list[Any], known: Any, way: float) -> Any:
+        """Return the mask of the lanes in which the signal may exceed its largest value so far.
+
+        With ``way`` -1 it may fall below its smallest one.
+        """
+        w, highest, lowest = self.w, values[0], values[0]
+        for value in values[1:]:
+            highest = w.choose(w.greater(value, highest), value, highest)
+            lowest = w.choose(w.smaller(value, lowest), value, lowest)
+        margin = w.times(w.add(highest, w.negative(lowest)), w.constant(_NEAR))
+        if way > 0.0:
+            higher = w.greater(w.add(highest, margin), known)
+        else:
+            higher = w.smaller(w.add(lowest, w.negative(margin)), known)
+        return w.builder.and_(self.there, higher)
+
+    def raise_extreme(self, rows: Any, row: int, mean: Any, way: float) -> None:
+        """Store the largest value of the signal, or with ``way`` -1 the smallest, in a row."""
+        w = self.w
         exceeds = w.greater if way > 0.0 else w.smaller
-        best, at, worst = values[0], self.places[0], values[0]
-        for value, place in zip(values[1:], self.places[1:], strict=True):
-            higher = exceeds(value, best)
-            best, at = w.choose(higher, value, best), w.choose(higher, place, at)
-            worst = w.choose(exceeds(worst, value), value, worst)
+        values, places = self.values(mean), self.places()
         known = w.load(rows, row * STRIDE)
-        reach = w.multiply_add(w.add(best, w.negative(worst)), w.constant(_NEAR), best)
-        near = builder.and_(self.there, exceeds(reach, known))
-        bits = builder.bitcast(near, ir.IntType(VECTOR))
-        with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0)), likely=False):
-            turn = self.value(self.turning_point(at))
+        near = self.near(values, known, way)
+        with w.builder.if_then(w.any(near)):
+            best, at = values[0], places[0]
+            for value, place in zip(values[1:], places[1:], strict=True):
+                higher = exceeds(value, best)
+                best, at = w.choose(higher, value, best), w.choose(higher, place, at)
+            terms = w.rows(self.vector, range(self.place.terms, self.place.terms + TERMS))
+            turn = w.add(value_of(w, terms, self.turning_point(terms, at)), mean)
             best = w.choose(exceeds(turn, best), turn, best)
-            raised = builder.and_(near, exceeds(best, known))
+            raised = w.builder.and_(near, exceeds(best, known))
             w.store(w.choose(raised, best, known), rows, row * STRIDE)
 
-    def turning_point(self, at: object) -> object:
+    def turning_point(self, terms: list[Any], at: Any) -> Any:
         """Return the turning points of the polynomials near a place, or a place of the piece."""
         w = self.w
         for _ in range(_ITERATIONS):
-            slope, bend, twist = self.derivatives(at)
+            slope, bend, twist = _derivatives(w, terms, at)
             # Halley's method; bend and twist are a half and a sixth of their derivatives.
             double = w.times(bend, w.constant(2.0))
             below = w.add(
@@ -207,15 +302,15 @@ class _Piece:
             at = w.choose(w.smaller(at, self.end), at, self.end)
         return at
 
-    def derivatives(self, at: object) -> tuple:
-        """Return the slope, half the second and a sixth of the third derivative at a place."""
-        w = self.w
-        nothing = w.constant(0.0)
-        value, slope, bend, twist = self.terms[TERMS - 1], nothing, nothing, nothing
-        for term in range(TERMS - 2, -1, -1):
-            twist = w.multiply_add(twist, at, bend)
-            bend = w.multiply_add(bend, at, slope)
-            slope = w.multiply_add(slope, at, value)
-            if term:
-                value = w.multiply_add(value, at, self.terms[term])
-        return slope, bend, twist
+
+def _derivatives(w: _Writer, terms: list[Any], at: Any) -> tuple[Any, Any, Any]:
+    """Return the slope, half the second and a sixth of the third derivative at a place."""
+    nothing = w.constant(0.0)
+    value, slope, bend, twist = terms[TERMS - 1], nothing, nothing, nothing
+    for term in range(TERMS - 2, -1, -1):
+        twist = w.multiply_add(twist, at, bend)
+        bend = w.multiply_add(bend, at, slope)
+        slope = w.multiply_add(slope, at, value)
+        if term:
+            value = w.multiply_add(value, at, terms[term])
+    return slope, bend, twist
