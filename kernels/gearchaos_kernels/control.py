@@ -23,9 +23,18 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
-from gearchaos_kernels.memory.lines import add_line, copy_line, predict_line, vary_line
+from gearchaos_kernels.memory.lines import (
+    add_line,
+    copy_line,
+    gather_line,
+    predict_line,
+    product_of_deviation,
+    product_of_line,
+    scale_line,
+    vary_line,
+)
 from gearchaos_kernels.memory.rows import STATE, STRIDE, control_rows, rows
-from gearchaos_kernels.methods.protocol import begin_lane
+from gearchaos_kernels.methods.protocol import change_input
 from gearchaos_kernels.plan import Floats
 
 CENTRE = (
@@ -320,21 +329,20 @@ def act(memory, block, period, batch, control, given, scene):
         if period == 0:
             prepare(memory, slot, index, control, batch.scales, scene)
         nearest = measure(memory, slot, index, moment, control, batch.scales, scene)
-        place, at = (index, nearest), control_rows(scene)
-        found = demanded(memory, slot, place, (at.known, at.kept), 1.0, control, scene)
+        place = index, nearest
+        found = demanded(memory, slot, place, control, scene)
         used = phase >= control.about[2] and abs(found) <= control.limit[index]
         effort = found if used else 0.0
         varied = 0.0
         if scene.tangent is not None:
             if used:
-                sources = at.known_varied, at.kept_varied
-                varied = demanded(memory, slot, place, sources, 0.0, control, scene)
+                varied = demanded_variation(memory, slot, place, control, scene)
         predict(memory, slot, index, nearest, (effort, varied), control, scene)
         strength = control.strength[index]
         coefficient = control.steady[index] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
         memory[control_rows(scene).varied * STRIDE + slot] = strength * varied
-        begin_lane(memory, slot, index, read_lane(memory, slot, scene), given, scene)
+        change_input(memory, slot, read_lane(memory, slot, scene), scene)
         if slot < block.lanes:
             control.inputs[index, period] = effort
 
@@ -384,16 +392,15 @@ def measure(memory, slot, index, moment, control, scales, scene):
         correct(memory, slot, (index, nearest), moment, control, scales, scene)
         # The corrected estimate may be nearer to another point.
         return nearest_point(memory, moment[1], control, index, scene)
-    for state in range(at.states):
-        value = state_at(memory, slot, index, state, scales)
-        if control.about[4] > 0:
+    gather_line(memory, known, STATE, slot, scales, index * at.states, scene)
+    if scene.tangent is not None:
+        gather_line(memory, known_varied, tangent, slot, scales, index * at.states, scene)
+    if control.about[4] > 0:
+        for state in range(at.states):
             noise = control.noise[index, state]
             if noise > 0.0:
-                value += noise * gaussian(control.seeds[index], moment[0] * at.states + state)
-        memory[known + state] = value
-        if scene.tangent is not None:
-            varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
-            memory[known_varied + state] = varied
+                number = moment[0] * at.states + state
+                memory[known + state] += noise * gaussian(control.seeds[index], number)
     return nearest_point(memory, moment[1], control, index, scene)
 
 
@@ -452,21 +459,37 @@ def nearest_point(memory, first, control, index, scene):
 
 
 @scalar
-def demanded(memory, slot, place, sources, target, control, scene):
-    """Return the input that the gains demand, -K times a deviation, or its variation.
+def demanded(memory, slot, place, control, scene):
+    """Return the input that the gains demand, -K times a deviation.
 
-    ``place``: the lane and the nearest point of the orbit; ``sources``: rows of what is known and
-    of what is kept; ``target``: 1 for the input, 0 for its variation, as the orbit does not vary.
+    ``place``: the lane and the nearest point of the orbit.
     """
-    (index, nearest), (known, kept) = place, sources
-    delay, states = control_rows(scene).delay, control_rows(scene).states
+    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).states
+    known = at.known * STRIDE
+    if at.delay > 0:
+        now = product_of_line(memory, known, control.gain, number, scene)
+        return delayed(memory, slot, place, at.kept, control, scene) - now
+    return -product_of_deviation(memory, known, control.points, control.gain, number, scene)
+
+
+@scalar
+def demanded_variation(memory, slot, place, control, scene):
+    """Return the variation of the demanded input; the orbit does not vary."""
+    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).states
+    now = product_of_line(memory, at.known_varied * STRIDE, control.gain, number, scene)
+    if at.delay > 0:
+        return delayed(memory, slot, place, at.kept_varied, control, scene) - now
+    return -now
+
+
+@scalar
+def delayed(memory, slot, place, kept, control, scene):
+    """Return K times the earliest state, or its variation, of those that are kept from a row on."""
+    (index, nearest), at = place, control_rows(scene)
+    first = kept + (at.delay - 1) * at.states
     total = 0.0
-    for state in range(states):
-        reference = target * control.points[index, nearest, state]
-        if delay > 0:
-            reference = memory[(kept + (delay - 1) * states + state) * STRIDE + slot]
-        deviation = memory[known * STRIDE + state] - reference
-        total -= control.gain[index, nearest, state] * deviation
+    for state in range(at.states):
+        total += control.gain[index, nearest, state] * memory[(first + state) * STRIDE + slot]
     return total
 
 
@@ -514,12 +537,12 @@ def move_back(memory, slot, number, sources, scene):
 def scale_variations(memory, slot, length, scene):
     """Divide all variations of the controller by the length of the tangent vector."""
     at = control_rows(scene)
-    memory[at.varied * STRIDE + slot] /= length
-    for number in range(at.end - at.kept_varied):
-        if scene.feedback.estimated is not None:
-            memory[estimate_of(at.kept_varied, slot, scene) + number] /= length
-        else:
-            memory[(at.kept_varied + number) * STRIDE + slot] /= length
+    inverse = 1.0 / length
+    memory[at.varied * STRIDE + slot] *= inverse
+    if scene.feedback.estimated is not None:
+        scale_line(memory, estimate_of(at.kept_varied, slot, scene), inverse, scene)
+    for number in range(at.delay * at.states):
+        memory[(at.kept_varied + number) * STRIDE + slot] *= inverse
 
 
 @scalar

@@ -11,6 +11,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH, first_element
+from gearchaos_kernels.memory.rows import STRIDE
 
 _DOUBLE = ir.DoubleType()
 _FLAGS = tuple(sorted(FASTMATH))
@@ -61,6 +62,30 @@ class _Line:
         order = ir.Constant(ir.VectorType(index, self.states), [index(0)] * self.states)
         return self.builder.shuffle_vector(first, nothing, order)
 
+    def gather(self, array: int, row: int, slot: int) -> Any:
+        """Collect the numbers of one slot from consecutive rows of a block."""
+        first = self.builder.mul(self.arguments[row][1], self.arguments[row][1].type(STRIDE))
+        first = self.builder.add(first, self.arguments[slot][1])
+        self.arguments += ((types.intp, first),)
+        begin = len(self.arguments) - 1
+        vector = ir.Constant(self.kind, ir.Undefined)
+        for number in range(self.states):
+            one = self.builder.load(self.address(array, begin, number * STRIDE))
+            vector = self.builder.insert_element(vector, one, ir.IntType(32)(number))
+        return vector
+
+    def total(self, vector: Any) -> Any:
+        """Return the sum of the components of a vector, in pairs."""
+        parts = [
+            self.builder.extract_element(vector, ir.IntType(32)(number))
+            for number in range(self.states)
+        ]
+        while len(parts) > 1:
+            odd = parts[len(parts) // 2 * 2 :]
+            pairs = zip(parts[0::2], parts[1::2], strict=False)
+            parts = [self.builder.fadd(a, b, flags=_FLAGS) for a, b in pairs] + odd
+        return parts[0]
+
     def argument(self, number: int) -> Any:
         """Return a vector whose components all equal an argument."""
         return self.spread(self.arguments[number][1])
@@ -91,6 +116,55 @@ def copy_line(_typing, memory, target, source, scene):
         return context.get_dummy_value()
 
     return types.void(memory, types.intp, types.intp, scene), generate
+
+
+@intrinsic
+def gather_line(_typing, memory, target, row, slot, array, at, scene):
+    """Store the numbers of one slot in consecutive rows, times numbers of an array."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        numbers = builder.fmul(line.gather(0, 2, 3), line.load(4, 5), flags=_FLAGS)
+        line.store(numbers, 0, 1)
+        return context.get_dummy_value()
+
+    place = types.intp
+    return types.void(memory, place, place, place, array, place, scene), generate
+
+
+@intrinsic
+def scale_line(_typing, memory, target, factor, scene):
+    """Multiply the numbers of one state by a factor."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        line.store(builder.fmul(line.load(0, 1), line.argument(2), flags=_FLAGS), 0, 1)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, types.float64, scene), generate
+
+
+@intrinsic
+def product_of_line(_typing, memory, source, array, at, scene):
+    """Return the scalar product of the numbers of one state and those of an array."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        return line.total(builder.fmul(line.load(0, 1), line.load(2, 3), flags=_FLAGS))
+
+    return types.float64(memory, types.intp, array, types.intp, scene), generate
+
+
+@intrinsic
+def product_of_deviation(_typing, memory, source, points, array, at, scene):
+    """Return the same of the deviation of one state from a point, which has the same place."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        deviation = builder.fsub(line.load(0, 1), line.load(2, 4), flags=_FLAGS)
+        return line.total(builder.fmul(deviation, line.load(3, 4), flags=_FLAGS))
+
+    return types.float64(memory, types.intp, points, array, types.intp, scene), generate
 
 
 @intrinsic

@@ -99,6 +99,8 @@ class Method:
         Returns what one block needs besides its memory.
     begin_lane(memory, slot, index, lane, given, scene)
         Prepares a lane before its first step; ``index``: its number among all lanes.
+    change_input(memory, slot, lane, scene)
+        Prepares a lane whose steady input a controller has changed.
     step(memory, lanes, at, given, scene)
         Takes one step in every slot; returns how many lanes may have left a contact branch.
         ``lanes``: number of lanes of the block; ``at``: the `StepAt`; ``given``: the `StepInputs`.
@@ -126,6 +128,7 @@ class Method:
     maps_per_step: Any
     workspace: Any
     begin_lane: Any
+    change_input: Any
     step: Any
     resolve: Any
     grids: Any
@@ -180,6 +183,7 @@ class StepInputs(NamedTuple):
 
 workspace = Interface("method", "workspace")
 begin_lane = Interface("method", "begin_lane")
+change_input = Interface("method", "change_input")
 maps_per_step = Interface("method", "maps_per_step")
 take_step = Interface("method", "step")
 resolve = Interface("method", "resolve")

@@ -19,7 +19,7 @@ from gearchaos_kernels.methods.flow_map.layout import (
     rows_needed,
 )
 from gearchaos_kernels.methods.flow_map.on_demand import shares_on_demand
-from gearchaos_kernels.methods.flow_map.steps import begin_lane, move_block
+from gearchaos_kernels.methods.flow_map.steps import begin_lane, change_input, move_block
 from gearchaos_kernels.methods.flow_map.store import (
     fewest_steps,
     maps_are_kept,
@@ -113,6 +113,7 @@ FLOW_MAP = Method(
     maps_per_step=maps_per_step,
     workspace=workspace,
     begin_lane=begin_lane,
+    change_input=change_input,
     step=step,
     resolve=resolve,
     grids=grids,

@@ -65,6 +65,14 @@ def begin_lane(memory, slot, index, lane, given, scene):
 
 
 @scalar
+def change_input(memory, slot, lane, scene):
+    """Store the steady input of a lane, the first of its inputs, and what follows from it."""
+    memory[method_rows(scene).inputs * STRIDE + slot] = inputs_of(lane, scene)[0]
+    if scene.traced is not None:
+        store_means(memory, slot, lane, scene)
+
+
+@scalar
 def store_means(memory, slot, lane, scene):
     """Store the constant part of each signal; forces have none."""
     state, first = state_of(memory, slot, scene), method_rows(scene).means

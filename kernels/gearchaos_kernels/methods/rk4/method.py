@@ -74,6 +74,11 @@ def begin_lane(memory, slot, index, lane, given, scene):
 
 
 @scalar
+def change_input(memory, slot, lane, scene):
+    """Prepare nothing: a step reads the input among the coefficients of its lane."""
+
+
+@scalar
 def step(memory, lanes, at, given, scene):
     """Take one step in every slot; return how many lanes may have left a contact branch."""
     # Hoisted out of the loop over slots: the compiler cannot rule out aliasing with the tables.
@@ -158,6 +163,7 @@ RK4 = Method(
     maps_per_step=maps_per_step,
     workspace=workspace,
     begin_lane=begin_lane,
+    change_input=change_input,
     step=step,
     resolve=resolve,
     grids=grids,

@@ -103,6 +103,11 @@ def begin_lane(memory, slot, index, lane, given, scene):
 
 
 @scalar
+def change_input(memory, slot, lane, scene):
+    """Prepare nothing: a piece reads the input among the coefficients of its lane."""
+
+
+@scalar
 def step(memory, lanes, at, given, scene):
     """Take one step in every slot, piece by piece; return 0, because no crossing is left."""
     for first in range(0, slots_of(lanes), VECTOR):
@@ -193,6 +198,7 @@ TAYLOR = Method(
     maps_per_step=maps_per_step,
     workspace=workspace,
     begin_lane=begin_lane,
+    change_input=change_input,
     step=step,
     resolve=resolve,
     grids=grids,
