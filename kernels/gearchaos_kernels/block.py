@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.compilation import align_stack, part, scalar
+from gearchaos_kernels.compilation import align_stack, maker, scalar
 from gearchaos_kernels.contact.branches import branches_at
 from gearchaos_kernels.control import act, scale_variations
 from gearchaos_kernels.memory.block_memory import (
@@ -102,7 +102,7 @@ class Batch(NamedTuple):
     turns: NDArray[np.float64]
 
 
-@part
+@maker
 def integrate_block(number_of_block, batch, tables, plan, outcome, control, scene):
     """Integrate the lanes of a block, and write what is recorded of them into the outcome.
 

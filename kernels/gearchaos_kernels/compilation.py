@@ -49,6 +49,7 @@ FASTMATH = {"contract", "nsz"}
 """Fused multiply-add and unsigned zeros only: NaN and infinity keep their meaning."""
 
 PART = {"pipeline_class": PartCompiler}
+NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 CACHE_LINE = 64  # Bytes that one aligned 512-bit vector occupies.
 
@@ -95,13 +96,21 @@ def _decorate(function: Callable[..., Any], *, how: dict[str, Any], **optional: 
 
 def scalar(function: Callable[..., Any]) -> Any:
     """Compile a formula that only compiled code calls; it is inlined into every caller."""
-    flags = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "_nrt": False}
-    return _decorate(function, how=PART, forceinline=True, **flags)
+    return _decorate(function, how=PART, forceinline=True, _nrt=False, **NO_WRAPPERS)
 
 
 def part(function: Callable[..., Any]) -> Any:
-    """Compile a function that only compiled code calls; it is not forced into its callers."""
-    return _decorate(function, how=PART, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+    """Compile a function that only compiled code calls; it is not forced into its callers.
+
+    It cannot create arrays. In exchange, references to its arguments are not counted, which takes
+    longer than the rest of a short function.
+    """
+    return _decorate(function, how=PART, _nrt=False, **NO_WRAPPERS)
+
+
+def maker(function: Callable[..., Any]) -> Any:
+    """Compile a part that creates arrays."""
+    return _decorate(function, how=PART, **NO_WRAPPERS)
 
 
 def dispatcher_of(function: Callable[..., Any], parallel: bool = True) -> Any:

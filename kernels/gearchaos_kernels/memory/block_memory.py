@@ -8,7 +8,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from gearchaos_kernels.compilation import CACHE_LINE, first_element, part, scalar
+from gearchaos_kernels.compilation import CACHE_LINE, first_element, maker, scalar
 from gearchaos_kernels.memory.rows import (
     BRANCH,
     LANES,
@@ -26,7 +26,7 @@ from gearchaos_kernels.scene import Scene, provider_of
 _ITEM = np.dtype(np.float64).itemsize
 
 
-@part
+@maker
 def aligned_memory(count):
     """Return uninitialised memory for n rows of one block, which starts on a cache line."""
     size = count * STRIDE

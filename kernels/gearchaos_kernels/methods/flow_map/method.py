@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.compilation import maker, scalar
 from gearchaos_kernels.memory.block_memory import aligned_memory, slots_of
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.flow_map.along import gap_terms
@@ -72,7 +72,7 @@ def maps_per_step(scene):
     return layout(scene).step_size
 
 
-@part
+@maker
 def workspace(scene):
     """Return memory for lanes that cross, and for the only lane of a block."""
     aside = aligned_memory(aside_rows(scene).total)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import prange
 from numpy.polynomial import chebyshev
 
-from gearchaos_kernels.compilation import apart, compact, driver, evaluator, part, scalar
+from gearchaos_kernels.compilation import apart, compact, driver, evaluator, maker, scalar
 from gearchaos_kernels.contact.elements import Push
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.searching import fourth_derivative
@@ -150,7 +150,7 @@ def make_maps(matrices, elements_on, inputs, forcing, tables, tails, place):
         tails[lane] = fill_maps(matrices[lane], of_lane, inputs, forcing, tables[lane], place)
 
 
-@part
+@maker
 def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
     compact()
@@ -172,7 +172,7 @@ def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     return tail
 
 
-@part
+@maker
 def with_dampers(matrix, engaged, dampers):
     """Return a matrix of `differentiate` with the dampers of the engaged elements."""
     compact()
@@ -186,7 +186,7 @@ def with_dampers(matrix, engaged, dampers):
     return damped
 
 
-@part
+@maker
 def spring_series(stiffness, forcing):
     """Return the series of the stiffness of every element, shape (elements, ORDER, steps)."""
     compact()
@@ -203,7 +203,7 @@ def spring_series(stiffness, forcing):
     return springs
 
 
-@part
+@maker
 def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     """Write the maps of some steps on one set of branches; return the truncation error.
 
@@ -250,7 +250,7 @@ def fill_steps(matrix, on_branches, inputs, forcing, target, place):
     return tail
 
 
-@part
+@maker
 def piece_of(matrix, lines, columns):
     """Return a piece of a matrix; ``lines``, ``columns``: the first one, and the one after."""
     compact()
@@ -261,7 +261,7 @@ def piece_of(matrix, lines, columns):
     return piece
 
 
-@part
+@maker
 def transposed(matrix, columns):
     """Return the transpose of the first columns of a matrix."""
     compact()
@@ -272,7 +272,7 @@ def transposed(matrix, columns):
     return turned
 
 
-@part
+@maker
 def motion_series(matrices, acting, inputs, forcing, place):
     """Return the series of the motion and of the gaps about the middle of some steps, by column.
 
@@ -311,7 +311,7 @@ def motion_series(matrices, acting, inputs, forcing, place):
     return psi, gap, force
 
 
-@part
+@maker
 def inverse_series(matrices, acting, place):
     """Return the series of the inverse flow, transposed, of its product with the mobilities, and K.
 
@@ -329,7 +329,7 @@ def inverse_series(matrices, acting, place):
     return inverse, moved, switch
 
 
-@part
+@maker
 def at_beginning(begin, back, place):
     """Return what turns columns of the middle of a step into those of its beginning.
 
@@ -355,7 +355,7 @@ def at_beginning(begin, back, place):
     return from_beginning, first
 
 
-@part
+@maker
 def write_maps(end, along, traced, target, place):
     """Write maps, gaps and switches of some steps into a table, and how much the gaps bend."""
     compact()
@@ -382,7 +382,7 @@ def write_maps(end, along, traced, target, place):
                     piece[place.switch + (element * TERMS + term) * place.width + line] = value
 
 
-@part
+@maker
 def write_dampers(kept, damping, target, place):
     """Write what transfers the force of dampers that act in contact only."""
     compact()
@@ -396,7 +396,7 @@ def write_dampers(kept, damping, target, place):
                     piece[(element * TERMS + term) * place.width + line] = value
 
 
-@part
+@maker
 def solve(scale, matrices, acting, terms, seen, pulled):
     """Solve terms' = scale (rates + outer K engaged inner) terms for the terms of a series.
 
@@ -425,7 +425,7 @@ def solve(scale, matrices, acting, terms, seen, pulled):
         add_product(scale / (k + 1), outer, forces, terms[k + 1])
 
 
-@part
+@maker
 def add_product(scale, a, b, target):
     """Add the product of a small matrix and a large one, times a number, to a target.
 
@@ -440,7 +440,7 @@ def add_product(scale, a, b, target):
                     target[line, column] += factor * b[source, column]
 
 
-@part
+@maker
 def combined(matrix, series):
     """Return a matrix times the terms of a series; further axes of the series are flattened."""
     flat = series.reshape((series.shape[0], -1))
@@ -449,7 +449,7 @@ def combined(matrix, series):
     return target
 
 
-@part
+@maker
 def multiplied(a, b):
     """Return the products of the matrices of every step; the last axis is that of steps."""
     apart()
@@ -467,7 +467,7 @@ def multiplied(a, b):
     return target
 
 
-@part
+@maker
 def economised(series, by):
     """Cut Taylor series to `TERMS` terms, and multiply them by the matrices of every step.
 
@@ -487,7 +487,7 @@ def economised(series, by):
     return terms, most / np.maximum(largest(kept), 1e-300)
 
 
-@part
+@maker
 def largest(matrix):
     """Return the largest absolute value of a matrix, or NaN if it contains one."""
     compact()

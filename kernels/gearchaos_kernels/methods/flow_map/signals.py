@@ -7,7 +7,7 @@ its damper. Constant parts of observed signals have no column; see `steps.store_
 
 import numpy as np
 
-from gearchaos_kernels.compilation import compact, part, scalar
+from gearchaos_kernels.compilation import compact, maker, scalar
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.methods.flow_map.layout import TERMS, layout
 from gearchaos_kernels.methods.flow_map.quadrature import PLACES, POINTS
@@ -46,7 +46,7 @@ def differentiate_signals(state, lane, acting, waves, of_lane, column, scene):
         forces[element, SHARE] = shares[element]
 
 
-@part
+@maker
 def observed_series(psi, observed, terms):
     """Return the series of the observed signals, shape (terms, signals, columns * width).
 
@@ -65,7 +65,7 @@ def observed_series(psi, observed, terms):
     return series
 
 
-@part
+@maker
 def add_dampers(springs, gaps, engaged, forces):
     """Turn K times the deflections into forces, in place.
 
@@ -88,7 +88,7 @@ def add_dampers(springs, gaps, engaged, forces):
                     springs[row, column, at] = force + rate * gaps[following, column, at]
 
 
-@part
+@maker
 def write_signals(along, first, target, place):
     """Write terms and values of signals along some steps into a table, from number ``first`` on.
 
