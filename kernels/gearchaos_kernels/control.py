@@ -314,7 +314,7 @@ class Actuation(NamedTuple):
     about: NDArray[np.intp]
 
 
-@part
+@scalar
 def act(memory, block, period, batch, control, given, scene):
     """Choose the input of all lanes of a block for a mesh period, and its variation.
 
