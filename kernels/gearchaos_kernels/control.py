@@ -25,7 +25,6 @@ from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
 from gearchaos_kernels.memory.lines import (
     add_line,
-    copy_line,
     gather_line,
     predict_line,
     product_of_deviation,
@@ -385,13 +384,11 @@ def measure(memory, slot, index, moment, control, scales, scene):
     at, tangent = control_rows(scene), rows(scene).tangent
     known, known_varied = at.known * STRIDE, at.known_varied * STRIDE
     if scene.feedback.estimated is not None:
-        copy_line(memory, known, estimate_of(at.kept, slot, scene), scene)
-        if scene.tangent is not None:
-            copy_line(memory, known_varied, estimate_of(at.kept_varied, slot, scene), scene)
-        nearest = nearest_point(memory, moment[1], control, index, scene)
+        kept = estimate_of(at.kept, slot, scene)
+        nearest = nearest_point(memory, kept, moment[1], control, index, scene)
         correct(memory, slot, (index, nearest), moment, control, scales, scene)
         # The corrected estimate may be nearer to another point.
-        return nearest_point(memory, moment[1], control, index, scene)
+        return nearest_point(memory, known, moment[1], control, index, scene)
     gather_line(memory, known, STATE, slot, scales, index * at.states, scene)
     if scene.tangent is not None:
         gather_line(memory, known_varied, tangent, slot, scales, index * at.states, scene)
@@ -401,7 +398,7 @@ def measure(memory, slot, index, moment, control, scales, scene):
             if noise > 0.0:
                 number = moment[0] * at.states + state
                 memory[known + state] += noise * gaussian(control.seeds[index], number)
-    return nearest_point(memory, moment[1], control, index, scene)
+    return nearest_point(memory, known, moment[1], control, index, scene)
 
 
 @scalar
@@ -415,6 +412,7 @@ def correct(memory, slot, place, moment, control, scales, scene):
     first = place_of(place, control) * signals * at.states
     kept = estimate_of(at.kept, slot, scene)
     kept_varied = estimate_of(at.kept_varied, slot, scene)
+    known, known_varied = kept, kept_varied
     for signal in range(signals):
         state, column = control.measured[signal], first + signal * at.states
         value = state_at(memory, slot, index, state, scales)
@@ -423,11 +421,14 @@ def correct(memory, slot, place, moment, control, scales, scene):
             if noise > 0.0:
                 value += noise * gaussian(control.seeds[index], moment[0] * signals + signal)
         error = value - memory[kept + state]
-        add_line(memory, at.known * STRIDE, error, columns, column, scene)
+        add_line(memory, at.known * STRIDE, known, error, columns, column, scene)
+        known = at.known * STRIDE
         if scene.tangent is not None:
             varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
             varied -= memory[kept_varied + state]
-            add_line(memory, at.known_varied * STRIDE, varied, columns, column, scene)
+            target = at.known_varied * STRIDE
+            add_line(memory, target, known_varied, varied, columns, column, scene)
+            known_varied = target
 
 
 @scalar
@@ -437,13 +438,12 @@ def place_of(place, control):
 
 
 @scalar
-def nearest_point(memory, first, control, index, scene):
-    """Return the number of the orbit's point that is nearest to what is known of the state.
+def nearest_point(memory, known, first, control, index, scene):
+    """Return the number of the orbit's point that is nearest to a state, the line at ``known``.
 
     Only points at the same phase of the excitation are compared; ``first``: the first of them.
     """
     points, repeats = control.points.shape[1], control.about[3]
-    known = control_rows(scene).known * STRIDE
     nearest = first
     if points == repeats:
         return nearest

@@ -107,18 +107,6 @@ class _Line:
 
 
 @intrinsic
-def copy_line(_typing, memory, target, source, scene):
-    """Copy the numbers of one state."""
-
-    def generate(context, builder, signature, arguments):
-        line = _Line(context, builder, signature, arguments)
-        line.store(line.load(0, 2), 0, 1)
-        return context.get_dummy_value()
-
-    return types.void(memory, types.intp, types.intp, scene), generate
-
-
-@intrinsic
 def gather_line(_typing, memory, target, row, slot, array, at, scene):
     """Store the numbers of one slot in consecutive rows, times numbers of an array."""
 
@@ -168,16 +156,17 @@ def product_of_deviation(_typing, memory, source, points, array, at, scene):
 
 
 @intrinsic
-def add_line(_typing, memory, target, factor, array, at, scene):
-    """Add the numbers of an array, from a place on, times a factor."""
+def add_line(_typing, memory, target, source, factor, array, at, scene):
+    """Store the numbers of one state plus a factor times those of an array, from a place on."""
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        total = line.multiply_add(line.load(3, 4), line.argument(2), line.load(0, 1))
+        total = line.multiply_add(line.load(4, 5), line.argument(3), line.load(0, 2))
         line.store(total, 0, 1)
         return context.get_dummy_value()
 
-    return types.void(memory, types.intp, types.float64, array, types.intp, scene), generate
+    place = types.intp
+    return types.void(memory, place, place, types.float64, array, place, scene), generate
 
 
 @intrinsic
