@@ -235,12 +235,12 @@ def _actuation(
     about = np.array([column, plan.first_period, control.begins, control.repeats, noisy])
     given = {name: getattr(control, name) for name in Actuation._fields if name in control._fields}
     # Intrinsics read rows of these arrays from one place on.
-    given["points"], given["response"] = map(
-        np.ascontiguousarray, (control.points, control.response)
-    )
-    for name in "transition", "correction":
-        columns = getattr(control, name).swapaxes(2, 3)
-        given[f"columns_of_{name}"] = np.ascontiguousarray(columns)
+    for name in "points", "gain", "response":
+        given[name] = np.ascontiguousarray(getattr(control, name))
+    correction = np.zeros_like(control.transition)
+    correction[..., control.measured] = control.correction
+    for name, matrices in ("transition", control.transition), ("correction", correction):
+        given[f"columns_of_{name}"] = np.ascontiguousarray(matrices.swapaxes(2, 3))
     # A column of its own: lanes are neighbours in it.
     steady = np.ascontiguousarray(coefficients[:, column])
     strength = system.input_strength(step)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
 from gearchaos_kernels.memory.lines import (
-    add_line,
+    correct_line,
     gather_line,
     predict_line,
     product_of_deviation,
@@ -283,8 +283,8 @@ class Actuation(NamedTuple):
         See `Control`.
     columns_of_transition : array, shape (lanes, points or 0, states, states)
         `Control.transition` with its columns as rows.
-    columns_of_correction : array, shape (lanes, points or 0, signals, states)
-        `Control.correction` with its columns as rows.
+    columns_of_correction : array, shape (lanes, points or 0, states, states)
+        `Control.correction` with its columns as rows, and zeros for states that are not measured.
     steady : array, shape (lanes,)
         The steady input of a lane, per step squared, without control.
     strength : array, shape (lanes,)
@@ -383,52 +383,32 @@ def measure(memory, slot, index, moment, control, scales, scene):
     """
     at, tangent = control_rows(scene), rows(scene).tangent
     known, known_varied = at.known * STRIDE, at.known_varied * STRIDE
-    if scene.feedback.estimated is not None:
-        kept = estimate_of(at.kept, slot, scene)
-        nearest = nearest_point(memory, kept, moment[1], control, index, scene)
-        correct(memory, slot, (index, nearest), moment, control, scales, scene)
-        # The corrected estimate may be nearer to another point.
-        return nearest_point(memory, known, moment[1], control, index, scene)
     gather_line(memory, known, STATE, slot, scales, index * at.states, scene)
     if scene.tangent is not None:
         gather_line(memory, known_varied, tangent, slot, scales, index * at.states, scene)
     if control.about[4] > 0:
-        for state in range(at.states):
-            noise = control.noise[index, state]
-            if noise > 0.0:
-                number = moment[0] * at.states + state
-                memory[known + state] += noise * gaussian(control.seeds[index], number)
+        add_noise(memory, known, index, moment[0], control)
+    if scene.feedback.estimated is not None:
+        kept, columns = estimate_of(at.kept, slot, scene), control.columns_of_correction
+        nearest = nearest_point(memory, kept, moment[1], control, index, scene)
+        place = place_of((index, nearest), control) * at.states
+        correct_line(memory, known, kept, columns, place, scene)
+        if scene.tangent is not None:
+            kept_varied = estimate_of(at.kept_varied, slot, scene)
+            correct_line(memory, known_varied, kept_varied, columns, place, scene)
+    # A corrected estimate may be nearer to another point.
     return nearest_point(memory, known, moment[1], control, index, scene)
 
 
 @scalar
-def correct(memory, slot, place, moment, control, scales, scene):
-    """Correct the estimate of a lane, and its variation, by what is measured.
-
-    ``place``: the lane and the nearest point of the orbit.
-    """
-    at, tangent, index = control_rows(scene), rows(scene).tangent, place[0]
-    signals, columns = control.measured.shape[0], control.columns_of_correction
-    first = place_of(place, control) * signals * at.states
-    kept = estimate_of(at.kept, slot, scene)
-    kept_varied = estimate_of(at.kept_varied, slot, scene)
-    known, known_varied = kept, kept_varied
+def add_noise(memory, known, index, period, control):
+    """Add the noise of the measured states of a lane in a mesh period."""
+    signals = control.measured.shape[0]
     for signal in range(signals):
-        state, column = control.measured[signal], first + signal * at.states
-        value = state_at(memory, slot, index, state, scales)
-        if control.about[4] > 0:
-            noise = control.noise[index, signal]
-            if noise > 0.0:
-                value += noise * gaussian(control.seeds[index], moment[0] * signals + signal)
-        error = value - memory[kept + state]
-        add_line(memory, at.known * STRIDE, known, error, columns, column, scene)
-        known = at.known * STRIDE
-        if scene.tangent is not None:
-            varied = memory[(tangent + state) * STRIDE + slot] * scales[index, state]
-            varied -= memory[kept_varied + state]
-            target = at.known_varied * STRIDE
-            add_line(memory, target, known_varied, varied, columns, column, scene)
-            known_varied = target
+        noise = control.noise[index, signal]
+        if noise > 0.0:
+            number = gaussian(control.seeds[index], period * signals + signal)
+            memory[known + control.measured[signal]] += noise * number
 
 
 @scalar

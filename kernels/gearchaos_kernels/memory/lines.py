@@ -156,17 +156,22 @@ def product_of_deviation(_typing, memory, source, points, array, at, scene):
 
 
 @intrinsic
-def add_line(_typing, memory, target, source, factor, array, at, scene):
-    """Store the numbers of one state plus a factor times those of an array, from a place on."""
+def correct_line(_typing, memory, target, source, columns, place, scene):
+    """Replace what is measured, y, by the corrected estimate: z + L (y - z).
+
+    ``target``: y, then the result; ``source``: z; ``columns``: matrices L whose columns follow each
+    other, in the order of the points; ``place``: that of the point.
+    """
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        total = line.multiply_add(line.load(4, 5), line.argument(3), line.load(0, 2))
-        line.store(total, 0, 1)
+        estimate = line.load(0, 2)
+        error = builder.fsub(line.load(0, 1), estimate, flags=_FLAGS)
+        line.store(line.times(3, 4, error, estimate), 0, 1)
         return context.get_dummy_value()
 
     place = types.intp
-    return types.void(memory, place, place, types.float64, array, place, scene), generate
+    return types.void(memory, place, place, columns, place, scene), generate
 
 
 @intrinsic
