@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
 from gearchaos_kernels.control import Actuation, Feedback
-from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.memory.rows import LANES, line_of
 from gearchaos_kernels.methods.protocol import Share, with_periods
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.lane_system import LaneSystem
@@ -234,17 +234,23 @@ def _actuation(
     noisy = int(np.any(control.noise > 0.0))
     about = np.array([column, plan.first_period, control.begins, control.repeats, noisy])
     given = {name: getattr(control, name) for name in Actuation._fields if name in control._fields}
-    # Intrinsics read rows of these arrays from one place on.
-    for name in "points", "gain", "response":
-        given[name] = np.ascontiguousarray(getattr(control, name))
+    given |= {name: _lines(getattr(control, name)) for name in ("points", "gain", "response")}
     correction = np.zeros_like(control.transition)
     correction[..., control.measured] = control.correction
     for name, matrices in ("transition", control.transition), ("correction", correction):
-        given[f"columns_of_{name}"] = np.ascontiguousarray(matrices.swapaxes(2, 3))
+        given[f"columns_of_{name}"] = _lines(matrices.swapaxes(2, 3))
     # A column of its own: lanes are neighbours in it.
     steady = np.ascontiguousarray(coefficients[:, column])
     strength = system.input_strength(step)
     return Actuation(**given, steady=steady, strength=strength, inputs=inputs, about=about)
+
+
+def _lines(vectors: Floats) -> Floats:
+    """Return vectors of all states as lines, see `line_of`."""
+    states = vectors.shape[-1]
+    lines = np.zeros((*vectors.shape[:-1], line_of(states)))
+    lines[..., :states] = vectors
+    return lines
 
 
 def _turns(orders: Floats, steps: NDArray[np.intp]) -> Floats:

@@ -97,11 +97,6 @@ class Feedback:
     delay: int
     states: int
 
-    @property
-    def kept(self) -> int:
-        """Numbers that a controller keeps from one period to the next."""
-        return self.delay * self.states + (self.states if self.estimated else 0)
-
 
 class Control(NamedTuple):
     """The controller of every lane; states and inputs are in the units of the equations.
@@ -142,8 +137,8 @@ class Control(NamedTuple):
 
     >>> point = np.zeros((1, 1, 6))
     >>> open_loop = Control.of_states(point, point, np.full(1, 0.1))
-    >>> open_loop.flags().kept
-    0
+    >>> open_loop.flags().states
+    6
     """
 
     points: Floats
@@ -277,13 +272,17 @@ OF_LANES = (
 class Actuation(NamedTuple):
     """The controllers of a batch and how their inputs act on lanes, as blocks read them.
 
+    Vectors of all states are lines, see `line_of`.
+
     Attributes
     ----------
-    points, gain, scales, limit, measured, noise, seeds, response : array
+    points, gain, response : array, shape (lanes, points, line)
         See `Control`.
-    columns_of_transition : array, shape (lanes, points or 0, states, states)
+    scales, limit, measured, noise, seeds : array
+        See `Control`.
+    columns_of_transition : array, shape (lanes, points or 0, states, line)
         `Control.transition` with its columns as rows.
-    columns_of_correction : array, shape (lanes, points or 0, states, states)
+    columns_of_correction : array, shape (lanes, points or 0, states, line)
         `Control.correction` with its columns as rows, and zeros for states that are not measured.
     steady : array, shape (lanes,)
         The steady input of a lane, per step squared, without control.
@@ -371,7 +370,7 @@ def prepare(memory, slot, index, control, scales, scene):
 @scalar
 def estimate_of(first, slot, scene):
     """Return the place of an estimate, whose numbers are side by side, or of its variation."""
-    return first * STRIDE + slot * control_rows(scene).states
+    return first * STRIDE + slot * control_rows(scene).line
 
 
 @scalar
@@ -391,7 +390,7 @@ def measure(memory, slot, index, moment, control, scales, scene):
     if scene.feedback.estimated is not None:
         kept, columns = estimate_of(at.kept, slot, scene), control.columns_of_correction
         nearest = nearest_point(memory, kept, moment[1], control, index, scene)
-        place = place_of((index, nearest), control) * at.states
+        place = place_of((index, nearest), control) * at.line
         correct_line(memory, known, kept, columns, place, scene)
         if scene.tangent is not None:
             kept_varied = estimate_of(at.kept_varied, slot, scene)
@@ -444,7 +443,7 @@ def demanded(memory, slot, place, control, scene):
 
     ``place``: the lane and the nearest point of the orbit.
     """
-    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).states
+    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).line
     known = at.known * STRIDE
     if at.delay > 0:
         now = product_of_line(memory, known, control.gain, number, scene)
@@ -455,7 +454,7 @@ def demanded(memory, slot, place, control, scene):
 @scalar
 def demanded_variation(memory, slot, place, control, scene):
     """Return the variation of the demanded input; the orbit does not vary."""
-    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).states
+    at, number = control_rows(scene), place_of(place, control) * control_rows(scene).line
     now = product_of_line(memory, at.known_varied * STRIDE, control.gain, number, scene)
     if at.delay > 0:
         return delayed(memory, slot, place, at.kept_varied, control, scene) - now
@@ -488,8 +487,8 @@ def predict(memory, slot, index, nearest, chosen, control, scene):
                 move_back(memory, slot, (earlier, state), varied, scene)
     if scene.feedback.estimated is not None:
         following = nearest + 1 if nearest + 1 < control.points.shape[1] else 0
-        place = place_of((index, nearest), control) * at.states
-        then = place_of((index, following), control) * at.states
+        place = place_of((index, nearest), control) * at.line
+        then = place_of((index, following), control) * at.line
         maps = control.response, control.columns_of_transition
         target, source = estimate_of(at.kept, slot, scene), at.known * STRIDE
         points = control.points, place, then

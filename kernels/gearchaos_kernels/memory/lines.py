@@ -1,5 +1,7 @@
 """Numbers of one lane side by side, as explicit vectors along its states.
 
+Such a line is filled up with zeros to whole vectors.
+
 An estimate is predicted by matrices that every lane has of its own. A vector of lanes would have to
 collect their numbers one by one, but those of one lane are neighbours.
 """
@@ -11,20 +13,21 @@ from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH, first_element
-from gearchaos_kernels.memory.rows import STRIDE
+from gearchaos_kernels.memory.rows import STRIDE, line_of
 
 _DOUBLE = ir.DoubleType()
 _FLAGS = tuple(sorted(FASTMATH))
 
 
 class _Line:
-    """Generates loads, stores and sums of vectors as long as the state of a scene."""
+    """Generates loads, stores and sums of lines of a scene."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
         self.context, self.builder = context, builder
         self.arguments = tuple(zip(signature.args, arguments, strict=True))
         self.states = signature.args[-1].scene.feedback.states
-        self.kind = ir.VectorType(_DOUBLE, self.states)
+        self.width = line_of(self.states)
+        self.kind = ir.VectorType(_DOUBLE, self.width)
 
     def address(self, array: int, at: int, further: int = 0) -> Any:
         """Return the address of a number of an array; both are arguments, given by position."""
@@ -49,6 +52,18 @@ class _Line:
         place = self.address(array, at, further)
         return self.builder.load(self.builder.bitcast(place, self.kind.as_pointer()), align=8)
 
+    def load_states(self, array: int, at: int) -> Any:
+        """Load numbers of all states that are not filled up, and fill them up."""
+        kind = ir.VectorType(_DOUBLE, self.states)
+        place = self.builder.bitcast(self.address(array, at), kind.as_pointer())
+        index = ir.IntType(32)
+        order = [index(min(number, self.states)) for number in range(self.width)]
+        return self.builder.shuffle_vector(
+            self.builder.load(place, align=8),
+            ir.Constant(kind, [0.0] * self.states),
+            ir.Constant(ir.VectorType(index, self.width), order),
+        )
+
     def store(self, vector: Any, array: int, at: int) -> None:
         """Store a vector."""
         place = self.builder.bitcast(self.address(array, at), self.kind.as_pointer())
@@ -59,7 +74,7 @@ class _Line:
         index = ir.IntType(32)
         nothing = ir.Constant(self.kind, ir.Undefined)
         first = self.builder.insert_element(nothing, number, index(0))
-        order = ir.Constant(ir.VectorType(index, self.states), [index(0)] * self.states)
+        order = ir.Constant(ir.VectorType(index, self.width), [index(0)] * self.width)
         return self.builder.shuffle_vector(first, nothing, order)
 
     def gather(self, array: int, row: int, slot: int) -> Any:
@@ -68,7 +83,7 @@ class _Line:
         first = self.builder.add(first, self.arguments[slot][1])
         self.arguments += ((types.intp, first),)
         begin = len(self.arguments) - 1
-        vector = ir.Constant(self.kind, ir.Undefined)
+        vector = ir.Constant(self.kind, [0.0] * self.width)
         for number in range(self.states):
             one = self.builder.load(self.address(array, begin, number * STRIDE))
             vector = self.builder.insert_element(vector, one, ir.IntType(32)(number))
@@ -101,7 +116,7 @@ class _Line:
         begin = len(self.arguments) - 1
         for number in range(self.states):
             factor = self.spread(self.builder.extract_element(factors, ir.IntType(32)(number)))
-            column = self.load(array, begin, number * self.states)
+            column = self.load(array, begin, number * self.width)
             total = self.multiply_add(column, factor, total)
         return total
 
@@ -112,7 +127,7 @@ def gather_line(_typing, memory, target, row, slot, array, at, scene):
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        numbers = builder.fmul(line.gather(0, 2, 3), line.load(4, 5), flags=_FLAGS)
+        numbers = builder.fmul(line.gather(0, 2, 3), line.load_states(4, 5), flags=_FLAGS)
         line.store(numbers, 0, 1)
         return context.get_dummy_value()
 

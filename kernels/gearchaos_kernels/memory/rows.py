@@ -118,13 +118,15 @@ class ControlRows(NamedTuple):
         the tangent vector.
     kept, kept_varied : int
         What it keeps until the next mesh period, and the variation of that. The estimate of slot s
-        is side by side as well, from number s * states on.
+        is side by side as well, from number s * line on.
     end : int
         The row after the last one.
     delay : int
         Mesh periods of a delayed feedback.
     states : int
         Number of states: a constant, so that loops over it are unrolled.
+    line : int
+        Numbers from one line to the next, see `line_of`.
     """
 
     varied: int
@@ -135,23 +137,36 @@ class ControlRows(NamedTuple):
     end: int
     delay: int
     states: int
+    line: int
+
+
+def line_of(states: int) -> int:
+    """Return the length of a line: the states of a lane side by side, filled up to vectors."""
+    return -(-states // VECTOR) * VECTOR
+
+
+def _kept(scene: Scene) -> int:
+    """Return the number of rows that a controller keeps from one period to the next."""
+    states = scene.feedback.states
+    return scene.feedback.delay * states + (line_of(states) if scene.feedback.estimated else 0)
 
 
 def control_rows_of(scene: Scene) -> ControlRows:
     """Return the rows that a controller uses in a block."""
-    first, states, kept = rows_of(scene).control, scene.feedback.states, scene.feedback.kept
+    first, states, kept = rows_of(scene).control, scene.feedback.states, _kept(scene)
     known = first + 1
-    line = -(-states // STRIDE)
-    last = known + 2 * line
+    lines = -(-line_of(states) // STRIDE)
+    last = known + 2 * lines
     return ControlRows(
         varied=first,
         known=known,
-        known_varied=known + line,
+        known_varied=known + lines,
         kept=last,
         kept_varied=last + kept,
         end=last + 2 * kept,
         delay=scene.feedback.delay,
         states=states,
+        line=line_of(states),
     )
 
 
@@ -159,8 +174,7 @@ def _control_size(scene: Scene) -> int:
     """Return the number of rows that a controller uses in a block."""
     if scene.control is None:
         return 0
-    size: int = 1 + 2 * -(-scene.feedback.states // STRIDE) + 2 * scene.feedback.kept
-    return size
+    return 1 + 2 * -(-line_of(scene.feedback.states) // STRIDE) + 2 * _kept(scene)
 
 
 @cache
