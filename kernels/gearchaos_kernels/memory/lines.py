@@ -109,16 +109,20 @@ class _Line:
         """Return a b + c."""
         return self.builder.fadd(c, self.builder.fmul(a, b, flags=_FLAGS), flags=_FLAGS)
 
-    def times(self, array: int, at: int, factors: Any, total: Any) -> Any:
-        """Add the columns of a matrix times the components of a vector, in their order."""
-        first = self.builder.mul(self.arguments[at][1], self.arguments[at][1].type(self.states))
-        self.arguments += ((types.intp, first),)
-        begin = len(self.arguments) - 1
+    def times(self, array: int, at: int, factors: Any, first: Any) -> Any:
+        """Return a vector plus the columns of a matrix times the components of another one.
+
+        Even and odd columns are summed apart, in parallel.
+        """
+        begin = self.builder.mul(self.arguments[at][1], self.arguments[at][1].type(self.states))
+        self.arguments += ((types.intp, begin),)
+        number_of_begin = len(self.arguments) - 1
+        sums = [first, ir.Constant(self.kind, [0.0] * self.width)]
         for number in range(self.states):
             factor = self.spread(self.builder.extract_element(factors, ir.IntType(32)(number)))
-            column = self.load(array, begin, number * self.width)
-            total = self.multiply_add(column, factor, total)
-        return total
+            column = self.load(array, number_of_begin, number * self.width)
+            sums[number % 2] = self.multiply_add(column, factor, sums[number % 2])
+        return self.builder.fadd(*sums, flags=_FLAGS)
 
 
 @intrinsic
@@ -202,11 +206,11 @@ def predict_line(_typing, memory, target, source, points, maps, effort, scene):
         orbit, place, then = line.parts(3)
         responses, columns = line.parts(4)
         point = line.load(orbit, place)
-        total = line.multiply_add(
-            line.load(responses, place), line.argument(5), line.load(orbit, then)
-        )
         deviation = builder.fsub(line.load(0, 2), point, flags=_FLAGS)
-        line.store(line.times(columns, place, deviation, total), 0, 1)
+        total = line.times(columns, place, deviation, line.load(orbit, then))
+        # Last, because the input takes long to compute.
+        total = line.multiply_add(line.load(responses, place), line.argument(5), total)
+        line.store(total, 0, 1)
         return context.get_dummy_value()
 
     place = types.intp
@@ -220,8 +224,10 @@ def vary_line(_typing, memory, target, source, place, maps, varied, scene):
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
         responses, columns = line.parts(4)
-        total = builder.fmul(line.load(responses, 3), line.argument(5), flags=_FLAGS)
-        line.store(line.times(columns, 3, line.load(0, 2), total), 0, 1)
+        nothing = ir.Constant(line.kind, [0.0] * line.width)
+        total = line.times(columns, 3, line.load(0, 2), nothing)
+        total = line.multiply_add(line.load(responses, 3), line.argument(5), total)
+        line.store(total, 0, 1)
         return context.get_dummy_value()
 
     given = memory, types.intp, types.intp, types.intp, maps, types.float64, scene
