@@ -322,12 +322,16 @@ def act(memory, block, period, batch, control, given, scene):
     phase = control.about[1] + period
     # Once for all lanes: a division takes as long as the feedback of a lane.
     moment = phase, phase % repeats
+    # Lane after lane, the processor would wait for each result that the next one builds on.
     for slot in range(slots_of(block.lanes)):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         if period == 0:
             prepare(memory, slot, index, control, batch.scales, scene)
-        nearest = measure(memory, slot, index, moment, control, batch.scales, scene)
-        place = index, nearest
+        measure(memory, slot, index, moment, control, batch.scales, scene)
+    for slot in range(slots_of(block.lanes)):
+        index = batch.order[block.first + min(slot, block.lanes - 1)]
+        # A corrected estimate may be nearer to another point.
+        place = index, nearest_point(memory, slot, moment[1], control, index, scene)
         found = demanded(memory, slot, place, control, scene)
         used = phase >= control.about[2] and abs(found) <= control.limit[index]
         effort = found if used else 0.0
@@ -335,7 +339,7 @@ def act(memory, block, period, batch, control, given, scene):
         if scene.tangent is not None:
             if used:
                 varied = demanded_variation(memory, slot, place, control, scene)
-        predict(memory, slot, index, nearest, (effort, varied), control, scene)
+        predict(memory, slot, place, (effort, varied), control, scene)
         strength = control.strength[index]
         coefficient = control.steady[index] + strength * effort
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficient
@@ -356,20 +360,22 @@ def state_at(memory, slot, index, state, scales):
 def prepare(memory, slot, index, control, scales, scene):
     """Begin the estimate at the first point of the orbit, and the delay at the first state."""
     at = control_rows(scene)
+    known, known_varied = line_at(at.known, slot, scene), line_at(at.known_varied, slot, scene)
+    # Beyond the states as well: uninitialised numbers may be denormal, which is slow.
+    for number in range(at.line):
+        memory[known + number] = control.points[index, 0, number]
+        memory[known_varied + number] = 0.0
     for state in range(at.states):
-        if scene.feedback.estimated is not None:
-            memory[estimate_of(at.kept, slot, scene) + state] = control.points[index, 0, state]
-            memory[estimate_of(at.kept_varied, slot, scene) + state] = 0.0
         for earlier in range(at.delay):
             row = earlier * at.states + state
             value = state_at(memory, slot, index, state, scales)
-            memory[(at.kept + row) * STRIDE + slot] = value
-            memory[(at.kept_varied + row) * STRIDE + slot] = 0.0
+            memory[(at.earlier + row) * STRIDE + slot] = value
+            memory[(at.earlier_varied + row) * STRIDE + slot] = 0.0
 
 
 @scalar
-def estimate_of(first, slot, scene):
-    """Return the place of an estimate, whose numbers are side by side, or of its variation."""
+def line_at(first, slot, scene):
+    """Return the place of the line of a slot."""
     return first * STRIDE + slot * control_rows(scene).line
 
 
@@ -377,37 +383,42 @@ def estimate_of(first, slot, scene):
 def measure(memory, slot, index, moment, control, scales, scene):
     """Store what the controller knows of the state, and the same of the tangent vector.
 
-    ``moment``: number of the mesh period, and the phase of the excitation in mesh periods. Returns
-    the number of the orbit's nearest point.
+    ``moment``: number of the mesh period, and the phase of the excitation in mesh periods.
     """
-    at, tangent = control_rows(scene), rows(scene).tangent
-    known, known_varied = at.known * STRIDE, at.known_varied * STRIDE
-    gather_line(memory, known, STATE, slot, scales, index * at.states, scene)
-    if scene.tangent is not None:
-        gather_line(memory, known_varied, tangent, slot, scales, index * at.states, scene)
-    if control.about[4] > 0:
-        add_noise(memory, known, index, moment[0], control)
+    at, tangent, place = (
+        control_rows(scene),
+        rows(scene).tangent,
+        index * control_rows(scene).states,
+    )
+    known, known_varied = line_at(at.known, slot, scene), line_at(at.known_varied, slot, scene)
+    seen, seen_varied = known, known_varied
     if scene.feedback.estimated is not None:
-        kept, columns = estimate_of(at.kept, slot, scene), control.columns_of_correction
-        nearest = nearest_point(memory, kept, moment[1], control, index, scene)
-        place = place_of((index, nearest), control) * at.line
-        correct_line(memory, known, kept, columns, place, scene)
+        seen, seen_varied = at.measured * STRIDE, at.measured_varied * STRIDE
+    gather_line(memory, seen, STATE, slot, scales, place, scene)
+    if scene.tangent is not None:
+        gather_line(memory, seen_varied, tangent, slot, scales, place, scene)
+    if control.about[4] > 0:
+        add_noise(memory, seen, index, moment[0], control)
+    if scene.feedback.estimated is not None:
+        nearest = nearest_point(memory, slot, moment[1], control, index, scene)
+        columns, place = (
+            control.columns_of_correction,
+            place_of((index, nearest), control) * at.line,
+        )
+        correct_line(memory, known, seen, columns, place, scene)
         if scene.tangent is not None:
-            kept_varied = estimate_of(at.kept_varied, slot, scene)
-            correct_line(memory, known_varied, kept_varied, columns, place, scene)
-    # A corrected estimate may be nearer to another point.
-    return nearest_point(memory, known, moment[1], control, index, scene)
+            correct_line(memory, known_varied, seen_varied, columns, place, scene)
 
 
 @scalar
-def add_noise(memory, known, index, period, control):
+def add_noise(memory, measured, index, period, control):
     """Add the noise of the measured states of a lane in a mesh period."""
     signals = control.measured.shape[0]
     for signal in range(signals):
         noise = control.noise[index, signal]
         if noise > 0.0:
             number = gaussian(control.seeds[index], period * signals + signal)
-            memory[known + control.measured[signal]] += noise * number
+            memory[measured + control.measured[signal]] += noise * number
 
 
 @scalar
@@ -417,12 +428,13 @@ def place_of(place, control):
 
 
 @scalar
-def nearest_point(memory, known, first, control, index, scene):
-    """Return the number of the orbit's point that is nearest to a state, the line at ``known``.
+def nearest_point(memory, slot, first, control, index, scene):
+    """Return the number of the orbit's point that is nearest to what is known of the state.
 
     Only points at the same phase of the excitation are compared; ``first``: the first of them.
     """
     points, repeats = control.points.shape[1], control.about[3]
+    known = line_at(control_rows(scene).known, slot, scene)
     nearest = first
     if points == repeats:
         return nearest
@@ -444,10 +456,10 @@ def demanded(memory, slot, place, control, scene):
     ``place``: the lane and the nearest point of the orbit.
     """
     at, number = control_rows(scene), place_of(place, control) * control_rows(scene).line
-    known = at.known * STRIDE
+    known = line_at(at.known, slot, scene)
     if at.delay > 0:
         now = product_of_line(memory, known, control.gain, number, scene)
-        return delayed(memory, slot, place, at.kept, control, scene) - now
+        return delayed(memory, slot, place, at.earlier, control, scene) - now
     return -product_of_deviation(memory, known, control.points, control.gain, number, scene)
 
 
@@ -455,17 +467,18 @@ def demanded(memory, slot, place, control, scene):
 def demanded_variation(memory, slot, place, control, scene):
     """Return the variation of the demanded input; the orbit does not vary."""
     at, number = control_rows(scene), place_of(place, control) * control_rows(scene).line
-    now = product_of_line(memory, at.known_varied * STRIDE, control.gain, number, scene)
+    known_varied = line_at(at.known_varied, slot, scene)
+    now = product_of_line(memory, known_varied, control.gain, number, scene)
     if at.delay > 0:
-        return delayed(memory, slot, place, at.kept_varied, control, scene) - now
+        return delayed(memory, slot, place, at.earlier_varied, control, scene) - now
     return -now
 
 
 @scalar
-def delayed(memory, slot, place, kept, control, scene):
-    """Return K times the earliest state, or its variation, of those that are kept from a row on."""
+def delayed(memory, slot, place, earlier, control, scene):
+    """Return K times the earliest of the states that are kept from a row on."""
     (index, nearest), at = place, control_rows(scene)
-    first = kept + (at.delay - 1) * at.states
+    first = earlier + (at.delay - 1) * at.states
     total = 0.0
     for state in range(at.states):
         total += control.gain[index, nearest, state] * memory[(first + state) * STRIDE + slot]
@@ -473,55 +486,54 @@ def delayed(memory, slot, place, kept, control, scene):
 
 
 @scalar
-def predict(memory, slot, index, nearest, chosen, control, scene):
+def predict(memory, slot, place, chosen, control, scene):
     """Keep what the next period needs: the predicted estimate, or the states of the delay.
 
-    ``chosen``: the input and its variation along the tangent vector.
+    ``place``: the lane and the nearest point of the orbit; ``chosen``: the input and its variation
+    along the tangent vector.
     """
     at = control_rows(scene)
-    for earlier in range(at.delay - 1, -1, -1):
+    known, known_varied = line_at(at.known, slot, scene), line_at(at.known_varied, slot, scene)
+    for back in range(at.delay - 1, -1, -1):
         for state in range(at.states):
-            move_back(memory, slot, (earlier, state), (at.known, at.kept), scene)
+            move_back(memory, slot, (back, state), (known, at.earlier), scene)
             if scene.tangent is not None:
-                varied = at.known_varied, at.kept_varied
-                move_back(memory, slot, (earlier, state), varied, scene)
+                move_back(memory, slot, (back, state), (known_varied, at.earlier_varied), scene)
     if scene.feedback.estimated is not None:
+        index, nearest = place
         following = nearest + 1 if nearest + 1 < control.points.shape[1] else 0
-        place = place_of((index, nearest), control) * at.line
-        then = place_of((index, following), control) * at.line
+        now, then = place_of(place, control), place_of((index, following), control)
         maps = control.response, control.columns_of_transition
-        target, source = estimate_of(at.kept, slot, scene), at.known * STRIDE
-        points = control.points, place, then
-        predict_line(memory, target, source, points, maps, chosen[0], scene)
+        points = control.points, now * at.line, then * at.line
+        predict_line(memory, known, points, maps, chosen[0], scene)
         if scene.tangent is not None:
-            target, source = estimate_of(at.kept_varied, slot, scene), at.known_varied * STRIDE
-            vary_line(memory, target, source, place, maps, chosen[1], scene)
+            vary_line(memory, known_varied, now * at.line, maps, chosen[1], scene)
 
 
 @scalar
 def move_back(memory, slot, number, sources, scene):
     """Store one state one period further back, where the delay keeps it.
 
-    ``number``: periods back, and the state; ``sources``: rows of what is known and kept.
+    ``number``: periods back, and the state; ``sources``: the line of what is known, and the first
+    row of earlier states.
     """
-    (earlier, state), (known, kept) = number, sources
-    row = kept + earlier * control_rows(scene).states + state
-    if earlier == 0:
-        memory[row * STRIDE + slot] = memory[known * STRIDE + state]
+    (back, state), (known, earlier), states = number, sources, control_rows(scene).states
+    row = earlier + back * states + state
+    if back == 0:
+        memory[row * STRIDE + slot] = memory[known + state]
     else:
-        memory[row * STRIDE + slot] = memory[(row - control_rows(scene).states) * STRIDE + slot]
+        memory[row * STRIDE + slot] = memory[(row - states) * STRIDE + slot]
 
 
 @scalar
 def scale_variations(memory, slot, length, scene):
     """Divide all variations of the controller by the length of the tangent vector."""
-    at = control_rows(scene)
-    inverse = 1.0 / length
+    at, inverse = control_rows(scene), 1.0 / length
     memory[at.varied * STRIDE + slot] *= inverse
     if scene.feedback.estimated is not None:
-        scale_line(memory, estimate_of(at.kept_varied, slot, scene), inverse, scene)
+        scale_line(memory, line_at(at.known_varied, slot, scene), inverse, scene)
     for number in range(at.delay * at.states):
-        memory[(at.kept_varied + number) * STRIDE + slot] *= inverse
+        memory[(at.earlier_varied + number) * STRIDE + slot] *= inverse
 
 
 @scalar

@@ -176,16 +176,16 @@ def product_of_deviation(_typing, memory, source, points, array, at, scene):
 
 @intrinsic
 def correct_line(_typing, memory, target, source, columns, place, scene):
-    """Replace what is measured, y, by the corrected estimate: z + L (y - z).
+    """Correct an estimate z at ``target`` by what is measured, y at ``source``: z + L (y - z).
 
-    ``target``: y, then the result; ``source``: z; ``columns``: matrices L whose columns follow each
-    other, in the order of the points; ``place``: that of the point.
+    ``columns``: matrices L whose columns follow each other, in the order of the points; ``place``:
+    that of the point.
     """
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        estimate = line.load(0, 2)
-        error = builder.fsub(line.load(0, 1), estimate, flags=_FLAGS)
+        estimate = line.load(0, 1)
+        error = builder.fsub(line.load(0, 2), estimate, flags=_FLAGS)
         line.store(line.times(3, 4, error, estimate), 0, 1)
         return context.get_dummy_value()
 
@@ -194,8 +194,8 @@ def correct_line(_typing, memory, target, source, columns, place, scene):
 
 
 @intrinsic
-def predict_line(_typing, memory, target, source, points, maps, effort, scene):
-    """Store r' + b u + A (z - r), which follows the estimate z at ``source``.
+def predict_line(_typing, memory, target, points, maps, effort, scene):
+    """Replace an estimate z by what follows it: r' + b u + A (z - r).
 
     ``points``: the points of the orbit, and the places of r and r' among them; ``maps``: vectors b,
     and matrices A whose columns follow each other, both in the order of the points.
@@ -203,32 +203,31 @@ def predict_line(_typing, memory, target, source, points, maps, effort, scene):
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        orbit, place, then = line.parts(3)
-        responses, columns = line.parts(4)
-        point = line.load(orbit, place)
-        deviation = builder.fsub(line.load(0, 2), point, flags=_FLAGS)
+        orbit, place, then = line.parts(2)
+        responses, columns = line.parts(3)
+        deviation = builder.fsub(line.load(0, 1), line.load(orbit, place), flags=_FLAGS)
         total = line.times(columns, place, deviation, line.load(orbit, then))
         # Last, because the input takes long to compute.
-        total = line.multiply_add(line.load(responses, place), line.argument(5), total)
+        total = line.multiply_add(line.load(responses, place), line.argument(4), total)
         line.store(total, 0, 1)
         return context.get_dummy_value()
 
     place = types.intp
-    return types.void(memory, place, place, points, maps, types.float64, scene), generate
+    return types.void(memory, place, points, maps, types.float64, scene), generate
 
 
 @intrinsic
-def vary_line(_typing, memory, target, source, place, maps, varied, scene):
-    """Store the variation of what `predict_line` stores: b times that of u, and A that of z."""
+def vary_line(_typing, memory, target, place, maps, varied, scene):
+    """Replace the variation of an estimate in the same way: b times that of u, and A that of z."""
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        responses, columns = line.parts(4)
+        responses, columns = line.parts(3)
         nothing = ir.Constant(line.kind, [0.0] * line.width)
-        total = line.times(columns, 3, line.load(0, 2), nothing)
-        total = line.multiply_add(line.load(responses, 3), line.argument(5), total)
+        total = line.times(columns, 2, line.load(0, 1), nothing)
+        total = line.multiply_add(line.load(responses, 2), line.argument(4), total)
         line.store(total, 0, 1)
         return context.get_dummy_value()
 
-    given = memory, types.intp, types.intp, types.intp, maps, types.float64, scene
-    return types.void(*given), generate
+    place = types.intp
+    return types.void(memory, place, place, maps, types.float64, scene), generate

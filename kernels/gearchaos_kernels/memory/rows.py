@@ -9,6 +9,7 @@ Rates are per step (h times d/d tau).
 """
 
 from functools import cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from llvmlite import ir
@@ -114,11 +115,12 @@ class ControlRows(NamedTuple):
     varied : int
         Variation of the input along the tangent vector, scaled as the steady input of a lane.
     known, known_varied : int
-        What the controller knows of the state of the lane in turn, side by side, and the same of
-        the tangent vector.
-    kept, kept_varied : int
-        What it keeps until the next mesh period, and the variation of that. The estimate of slot s
-        is side by side as well, from number s * line on.
+        What the controller knows of the state of every lane, and the same of the tangent vector,
+        as lines: that of slot s begins with number s * line. An estimate stays there.
+    measured, measured_varied : int
+        What is measured of one lane, as a line, from which its estimate is corrected.
+    earlier, earlier_varied : int
+        States of earlier mesh periods for a delayed feedback, and their variation.
     end : int
         The row after the last one.
     delay : int
@@ -132,8 +134,10 @@ class ControlRows(NamedTuple):
     varied: int
     known: int
     known_varied: int
-    kept: int
-    kept_varied: int
+    measured: int
+    measured_varied: int
+    earlier: int
+    earlier_varied: int
     end: int
     delay: int
     states: int
@@ -145,36 +149,21 @@ def line_of(states: int) -> int:
     return -(-states // VECTOR) * VECTOR
 
 
-def _kept(scene: Scene) -> int:
-    """Return the number of rows that a controller keeps from one period to the next."""
-    states = scene.feedback.states
-    return scene.feedback.delay * states + (line_of(states) if scene.feedback.estimated else 0)
-
-
 def control_rows_of(scene: Scene) -> ControlRows:
     """Return the rows that a controller uses in a block."""
-    first, states, kept = rows_of(scene).control, scene.feedback.states, _kept(scene)
-    known = first + 1
-    lines = -(-line_of(states) // STRIDE)
-    last = known + 2 * lines
-    return ControlRows(
-        varied=first,
-        known=known,
-        known_varied=known + lines,
-        kept=last,
-        kept_varied=last + kept,
-        end=last + 2 * kept,
-        delay=scene.feedback.delay,
-        states=states,
-        line=line_of(states),
-    )
+    first = accumulate(_control_sizes(scene), initial=rows_of(scene).control)
+    states = scene.feedback.states
+    return ControlRows(*first, scene.feedback.delay, states, line_of(states))
 
 
-def _control_size(scene: Scene) -> int:
-    """Return the number of rows that a controller uses in a block."""
+def _control_sizes(scene: Scene) -> list[int]:
+    """Return the number of rows of each part of what a controller stores."""
     if scene.control is None:
-        return 0
-    return 1 + 2 * -(-line_of(scene.feedback.states) // STRIDE) + 2 * _kept(scene)
+        return []
+    line = line_of(scene.feedback.states)
+    lines, one_line = -(-LANES * line // STRIDE), -(-line // STRIDE)
+    earlier = scene.feedback.delay * scene.feedback.states
+    return [1, lines, lines, one_line, one_line, earlier, earlier]
 
 
 @cache
@@ -196,7 +185,7 @@ def rows_of(scene: Scene) -> Rows:
         "model": model.rows(scene.model),
         "method": provider_of(scene.method).rows(scene),
         "recorders": provider_of(scene.recorders).rows(scene),
-        "control": _control_size(scene),
+        "control": sum(_control_sizes(scene)),
     }
     first, at = {}, 0
     for name, size in sizes.items():
