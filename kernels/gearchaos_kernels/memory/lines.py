@@ -69,13 +69,11 @@ class _Line:
         place = self.builder.bitcast(self.address(array, at), self.kind.as_pointer())
         self.builder.store(vector, place, align=8)
 
-    def spread(self, number: Any) -> Any:
-        """Return a vector whose components all equal a number."""
+    def spread(self, vector: Any, number: int) -> Any:
+        """Return a vector whose components all equal one component of a vector."""
         index = ir.IntType(32)
-        nothing = ir.Constant(self.kind, ir.Undefined)
-        first = self.builder.insert_element(nothing, number, index(0))
-        order = ir.Constant(ir.VectorType(index, self.width), [index(0)] * self.width)
-        return self.builder.shuffle_vector(first, nothing, order)
+        order = ir.Constant(ir.VectorType(index, self.width), [index(number)] * self.width)
+        return self.builder.shuffle_vector(vector, ir.Constant(self.kind, ir.Undefined), order)
 
     def gather(self, array: int, row: int, slot: int) -> Any:
         """Collect the numbers of one slot from consecutive rows of a block."""
@@ -103,7 +101,9 @@ class _Line:
 
     def argument(self, number: int) -> Any:
         """Return a vector whose components all equal an argument."""
-        return self.spread(self.arguments[number][1])
+        index, nothing = ir.IntType(32), ir.Constant(self.kind, ir.Undefined)
+        given = self.arguments[number][1]
+        return self.spread(self.builder.insert_element(nothing, given, index(0)), 0)
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
         """Return a b + c."""
@@ -119,7 +119,7 @@ class _Line:
         number_of_begin = len(self.arguments) - 1
         sums = [first, ir.Constant(self.kind, [0.0] * self.width)]
         for number in range(self.states):
-            factor = self.spread(self.builder.extract_element(factors, ir.IntType(32)(number)))
+            factor = self.spread(factors, number)
             column = self.load(array, number_of_begin, number * self.width)
             sums[number % 2] = self.multiply_add(column, factor, sums[number % 2])
         return self.builder.fadd(*sums, flags=_FLAGS)
