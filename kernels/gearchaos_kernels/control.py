@@ -322,14 +322,11 @@ def act(memory, block, period, batch, control, given, scene):
     phase = control.about[1] + period
     # Once for all lanes: a division takes as long as the feedback of a lane.
     moment = phase, phase % repeats
-    # Lane after lane, the processor would wait for each result that the next one builds on.
     for slot in range(slots_of(block.lanes)):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         if period == 0:
             prepare(memory, slot, index, control, batch.scales, scene)
         measure(memory, slot, index, moment, control, batch.scales, scene)
-    for slot in range(slots_of(block.lanes)):
-        index = batch.order[block.first + min(slot, block.lanes - 1)]
         # A corrected estimate may be nearer to another point.
         place = index, nearest_point(memory, slot, moment[1], control, index, scene)
         found = demanded(memory, slot, place, control, scene)
