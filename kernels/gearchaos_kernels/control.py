@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
 from gearchaos_kernels.memory.lines import (
     correct_line,
