@@ -153,7 +153,7 @@ def control_rows_of(scene: Scene) -> ControlRows:
     """Return the rows that a controller uses in a block."""
     first = accumulate(_control_sizes(scene), initial=rows_of(scene).control)
     delay, states = scene.feedback.delay, scene.feedback.states
-    return ControlRows(*first, delay=delay, states=states, line=line_of(states))
+    return ControlRows._make([*first, delay, states, line_of(states)])
 
 
 def _control_sizes(scene: Scene) -> list[int]:
