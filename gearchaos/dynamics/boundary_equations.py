@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate
+from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_taken
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import ROUNDING
@@ -182,8 +182,12 @@ class Equations(NamedTuple):
         ``place``: shape (states + 2,). Infinite if no gap has an extreme.
         """
         states = self.scale.size
-        plan = self.plan._replace(history_periods=self.plan.recorded_periods)
         system = self.system_at(np.clip(place[np.newaxis, states:], 0.0, 1.0))
+        # Flow maps take shorter steps at some values of the parameters.
+        plan = self.plan._replace(
+            history_periods=self.plan.recorded_periods,
+            steps_per_period=steps_taken(system, self.plan),
+        )
         start = (place[:states] * self.scale)[np.newaxis]
         history = integrate(system, start, plan).history
         halves = gaps_along(system, history, plan.steps_per_period).half_clearance[0]

@@ -21,7 +21,7 @@ from gearchaos.records.boundary import (
 )
 from gearchaos.records.branch import CLOSED_CURVE, EDGE, GRAZING, HALVING, LOST, TOO_MANY
 
-START_STEP, SHORT_STEP, LONGEST, SHORTEST = 0.04, 5e-3, 0.25, 1e-5
+START_STEP, SHORT_STEP, LONGEST, SHORTEST = 0.04, 5e-3, 0.25, 1e-7
 """Lengths of steps along a boundary: states in their scales, parameters in shares of ranges."""
 
 SIDE_BY_SIDE, MOST_AHEAD = 16, 2
