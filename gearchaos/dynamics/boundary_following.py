@@ -144,12 +144,16 @@ def _joined(
     points, here = half.points, half.points[-1]
     if trial is None or trial.tangent @ here.tangent < SMOOTH or _passes_half(here, trial):
         return None
+    length = float(np.linalg.norm(trial.place - here.place))
+    if at_edge and length < SAME_PLACE:
+        # A start at the edge is found again; the half on its other side must not meet it.
+        half.end = EDGE
+        return 0.0
     met = _met(here, trial, half, halves)
     if met is not None:
         half.met, met.met, met.end = met, half, ""
         return 0.0
-    length = float(np.linalg.norm(trial.place - here.place))
-    points += [trial] if length > 0.0 else []
+    points.append(trial)
     half.end = EDGE if at_edge else _end_at(points)
     turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
     return length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0)

@@ -39,15 +39,20 @@ class Reference(NamedTuple):
 def tests_of(kind: str, monodromy: Floats, references: Sequence[Reference]) -> Floats:
     """Return the test function of places with monodromy matrices, (places,); NaN without one.
 
+    At a Neimark-Sacker point it is the product of (multiplier times another one, minus 1) over all
+    pairs of multipliers. At a fold or a period doubling it is that of a bordered matrix.
+
     ``monodromy``: shape (places, states, states). Not for grazings.
     """
     values = np.full(len(monodromy), np.nan)
     finite = np.isfinite(monodromy).all(axis=(1, 2))
     matrices = monodromy[finite]
     if kind == NEIMARK_SACKER:
-        cosines = np.array([one.cosine for one in references])[finite]
-        found = pairs(np.linalg.eigvals(matrices), cosines)
-        values[finite] = (found[:, 0] * found[:, 1]).real - 1.0
+        # The product over all pairs of multipliers is a smooth function of the matrix, also where
+        # a third one is close to a pair (Kuznetsov 2004, section 10.2).
+        found = np.linalg.eigvals(matrices)
+        first, second = np.triu_indices(found.shape[1], 1)
+        values[finite] = np.prod(found[:, first] * found[:, second] - 1.0, axis=1).real
         return values
     states = monodromy.shape[-1]
     border = np.zeros((len(matrices), states + 1, states + 1))

@@ -1,0 +1,91 @@
+"""Boundaries of the pair of Pan 2021 where they are hard to follow."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.dynamics import boundary_tests
+from gearchaos.engine.bounding import coarse_map, find_boundaries
+from gearchaos.records.boundary import CORNER, STRONG_RESONANCE_11
+from gearchaos.records.branch import FOLD, LOST, NEIMARK_SACKER
+
+MAP = Path(__file__).parents[2] / "sweeps" / "speed_and_error.toml"
+
+
+@cache
+def boundaries():
+    """Return all boundaries of the map."""
+    return find_boundaries(coarse_map(gearchaos.load_config(MAP))).boundaries
+
+
+def curves(kind):
+    """Return the boundaries of a kind over the whole map."""
+    return [one for one in boundaries() if one.kind == kind]
+
+
+def places(curve, kind):
+    """Return speed and pitch error of the points of codimension 2 of a kind."""
+    return np.array([one.values for one in curve.points if one.kind == kind]).reshape(-1, 2)
+
+
+def second_compound(matrix):
+    """Return the minors of two rows and two columns; its eigenvalues are products of pairs."""
+    first, second = np.triu_indices(len(matrix), 1)
+    rows = matrix[first], matrix[second]
+    return rows[0][:, first] * rows[1][:, second] - rows[0][:, second] * rows[1][:, first]
+
+
+def test_the_test_of_a_pair_is_a_polynomial_of_the_matrix():
+    matrices = np.random.default_rng(5).normal(size=(20, 6, 6)) / 3.0
+    references = [boundary_tests.Reference()] * len(matrices)
+    values = boundary_tests.tests_of(NEIMARK_SACKER, matrices, references)
+    exact = [np.linalg.det(second_compound(one) - np.eye(15)) for one in matrices]
+    np.testing.assert_allclose(values, exact, rtol=1e-9, atol=1e-13)
+
+
+def resonances(kind):
+    """Return speed and pitch error of the 1:1 resonances on all curves of a kind."""
+    return np.concatenate([places(one, STRONG_RESONANCE_11) for one in curves(kind)])
+
+
+def test_every_curve_ends_for_a_reason():
+    assert len(boundaries()) == 14
+    assert not any(LOST in one.ends for one in boundaries())
+
+
+def test_curves_of_pairs_end_at_the_resonances_of_folds():
+    of_folds = resonances(FOLD)
+    for place in resonances(NEIMARK_SACKER):
+        assert np.min(np.abs(of_folds - place).max(axis=1)) < 2e-8
+
+
+def test_a_curve_turns_sharply_between_two_resonances():
+    # Its radius of curvature is 2e-5 there, in shares of the ranges and scales of the states.
+    turn, width = np.array([0.6130438, 7.4199]), np.array([1e-5, 1e-3])
+    near = [(np.abs(one.values - turn) < width).all(axis=1) for one in curves(NEIMARK_SACKER)]
+    (number,) = [at for at, some in enumerate(near) if some.any()]
+    assert np.flatnonzero(near[number])[0] > 0
+    assert np.flatnonzero(near[number])[-1] < near[number].size - 1
+    assert curves(NEIMARK_SACKER)[number].ends == (STRONG_RESONANCE_11, STRONG_RESONANCE_11)
+
+
+def test_a_resonance_next_to_a_third_multiplier_is_located():
+    place = np.array([0.8395176889, 2.4458479347])
+    (point,) = [
+        point
+        for one in curves(NEIMARK_SACKER)
+        for point in one.points
+        if np.abs(point.values - place).max() < 1e-6
+    ]
+    np.testing.assert_allclose(point.values, place, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(point.multipliers[:2], 1.0, rtol=0, atol=1e-3)
+    assert point.multipliers[2] == pytest.approx(0.995735, abs=1e-4)
+
+
+def test_a_fold_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
+    (curve,) = [one for one in curves(FOLD) if CORNER in one.ends]
+    end = curve.values[0 if curve.ends[0] == CORNER else -1]
+    np.testing.assert_allclose(end, [0.5544766, 4.666932], rtol=0, atol=1e-5)
