@@ -50,18 +50,44 @@ class Piece(NamedTuple):
     tables: Floats
     shape: tuple[int, int]
 
-    def at(self, value: float) -> Floats:
-        """Return the maps at a value of the parameter, shape (steps, size of a step)."""
+    def at(self, value: float, target: Floats | None = None) -> Floats:
+        """Return the maps at a value of the parameter, shape (steps, size of a step).
+
+        They are written to ``target``, shape (numbers,), if it is given.
+        """
         weights = (-1.0) ** np.arange(NODES) * np.sin(_ANGLES)
         with np.errstate(divide="ignore"):
             weights = weights / (value - self.nodes)
         (same,) = np.nonzero(np.isinf(weights))
         if same.size:
-            found: Floats = self.tables[same[0]]
-        else:
-            # The sum over nodes has the same order for any number of lanes.
-            found = (weights / weights.sum()) @ self.tables
+            weights = np.isinf(weights).astype(np.float64)
+        # The sum over nodes has the same order for any number of lanes.
+        found: Floats = np.matmul(weights / weights.sum(), self.tables, out=target)
         return found.reshape(self.shape)
+
+
+class Between(NamedTuple):
+    """The maps of a lane at a value of the parameter, interpolated where they are stored.
+
+    `size` is their number, `steps` that of steps per period.
+    """
+
+    piece: Piece
+    value: float
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return self.piece.tables.shape[1]
+
+    @property
+    def steps(self) -> int:
+        """Steps per period."""
+        return self.piece.shape[0]
+
+    def write(self, target: Floats) -> None:
+        """Write the maps to an array, shape (size,)."""
+        self.piece.at(self.value, target)
 
 
 _pieces: dict[Hashable, Piece | None] = {}
@@ -70,22 +96,22 @@ _pieces: dict[Hashable, Piece | None] = {}
 
 def interpolated(
     system: Any, steps: int, scene: Scene, along: int, name: Hashable
-) -> list[Floats | None]:
-    """Return the maps of lanes, each (steps, size of a step); None where they are not accurate.
+) -> list[Between | None]:
+    """Return the maps of lanes; None where they are not accurate.
 
     ``along``: number of the parameter, see `LaneSystem.map_parameters`; ``name``: what the maps
     depend on besides the parameters.
     """
     rows = system.map_parameters()
     others = np.delete(rows, along, axis=1)
-    found: list[Floats | None] = []
+    found: list[Between | None] = []
     for lane, value in enumerate(rows[:, along].tolist()):
         if not value > 0.0:
             found.append(None)
             continue
         key = name, others[lane].tobytes()
         piece = _piece_at(system, lane, value, (steps, scene, along), key)
-        found.append(None if piece is None else piece.at(value))
+        found.append(None if piece is None else Between(piece, value))
     return found
 
 

@@ -23,6 +23,7 @@ terms as Chebyshev series. If the series do not converge to rounding, the number
 doubled.
 """
 
+import sys
 from collections.abc import Hashable
 from typing import Any
 
@@ -30,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.memory.rows import LANES
-from gearchaos_kernels.methods.flow_map.interpolation import interpolated
+from gearchaos_kernels.methods.flow_map.interpolation import Between, interpolated
 from gearchaos_kernels.methods.flow_map.layout import MOST_SETS_IN_ADVANCE, layout_of
 from gearchaos_kernels.methods.flow_map.making import MOST_MAP_STEPS, make_tables
 from gearchaos_kernels.methods.substeps import multiple_of
@@ -142,13 +143,30 @@ class _Kept:
         self.places: dict[Hashable, tuple[int, int]] = {}
         self.steps: dict[Hashable, int] = {}
 
-    def keep(self, name: tuple[Hashable, bytes], maps: Floats) -> None:
+    def keep(self, name: tuple[Hashable, bytes], maps: Floats | Between) -> None:
         """Store the maps of a lane, shape (steps, size of a step), by scene and parameters."""
-        self.steps[name[0]] = len(maps)
-        self.table[self.used : self.used + maps.size] = maps.reshape(-1)
+        target = self.table[self.used : self.used + maps.size]
+        if isinstance(maps, Between):
+            maps.write(target)
+            steps = maps.steps
+        else:
+            target[:] = maps.reshape(-1)
+            steps = len(maps)
+        self.steps[name[0]] = steps
         place, self.used = self.used, self.used + maps.size
         # Last, so that a process forked meanwhile finds no name without its maps.
-        self.places[name] = len(maps), place
+        self.places[name] = steps, place
+
+
+    def emptied(self, size: int) -> "_Kept":
+        """Return an empty table with room for a number of numbers, this one if nobody reads it."""
+        # Its own attribute and the argument of getrefcount are two references.
+        if sys.getrefcount(self.table) > 2 or size > self.table.size:
+            return _Kept(size)
+        # Memory that is in use already takes no page faults.
+        self.places.clear()
+        self.used = 0
+        return self
 
 
 _kept = _Kept(0)
@@ -187,8 +205,7 @@ def maps_of(
         if _kept.used + size > min(_kept.table.size, max(size, map_bytes // 8)):
             if done:
                 break
-            # Not reused: another call may still be reading the old table.
-            _kept = _Kept(size)
+            _kept = _kept.emptied(size)
             continue
         for number, maps in zip(new, made, strict=True):
             _kept.keep(names[number], maps)
@@ -198,14 +215,14 @@ def maps_of(
 
 def _make(
     system: Any, steps: int, scene: Scene, along: int = -1, name: Hashable = None
-) -> list[Floats]:
+) -> list[Floats | Between]:
     """Compute the maps of lanes, each of shape (steps, size of a step), with enough steps.
 
     If not even `MOST_MAP_STEPS` suffice, the maps are NaN. ``along`` and ``name``: see
     `interpolated`.
     """
     place = layout_of(scene)
-    made = [np.full((0, 0), np.nan)] * system.lanes
+    made: list[Floats | Between] = [np.full((0, 0), np.nan)] * system.lanes
     left, count = np.arange(system.lanes), steps
     if along >= 0:
         between = interpolated(system, steps, scene, along, name)
