@@ -78,7 +78,7 @@ class Between(NamedTuple):
     @property
     def size(self) -> int:
         """Number of numbers."""
-        return self.piece.tables.shape[1]
+        return int(self.piece.tables.shape[1])
 
     @property
     def steps(self) -> int:

@@ -157,7 +157,6 @@ class _Kept:
         # Last, so that a process forked meanwhile finds no name without its maps.
         self.places[name] = steps, place
 
-
     def emptied(self, size: int) -> "_Kept":
         """Return an empty table with room for a number of numbers, this one if nobody reads it."""
         # Its own attribute and the argument of getrefcount are two references.
