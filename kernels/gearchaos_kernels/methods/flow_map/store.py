@@ -158,7 +158,7 @@ class _Kept:
         self.places[name] = steps, place
 
     def emptied(self, size: int) -> "_Kept":
-        """Return an empty table with room for a number of numbers, this one if nobody reads it."""
+        """Return an empty table of at least this size: this one, unless a call still reads it."""
         # Its own attribute and the argument of getrefcount are two references.
         if sys.getrefcount(self.table) > 2 or size > self.table.size:
             return _Kept(size)
