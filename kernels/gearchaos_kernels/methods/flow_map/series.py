@@ -4,11 +4,21 @@ Input are the formulas of the model, applied to unit vectors, and the waves that
 docstring of `store` has the equations that are solved here.
 """
 
+import math
+
 import numpy as np
 from numba import prange
 from numpy.polynomial import chebyshev
 
-from gearchaos_kernels.compilation import apart, compact, driver, evaluator, maker, scalar
+from gearchaos_kernels.compilation import (
+    apart,
+    compact,
+    driver,
+    evaluator,
+    maker,
+    part,
+    scalar,
+)
 from gearchaos_kernels.contact.elements import Push
 from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.searching import fourth_derivative
@@ -28,6 +38,7 @@ from gearchaos_kernels.methods.flow_map.signals import (
     observed_series,
     write_signals,
 )
+from gearchaos_kernels.methods.flow_map.together import TOGETHER, add_products
 from gearchaos_kernels.models.interfaces import (
     accelerations,
     elements_at,
@@ -42,9 +53,6 @@ ORDER = 22
 
 TAIL = 2e-15
 """Largest truncation error of the series, relative to their largest term."""
-
-TOGETHER = 8
-"""Steps whose series are computed together: they fill vectors and fit into the cache."""
 
 
 def _economy() -> tuple[Floats, Floats]:
@@ -404,25 +412,32 @@ def solve(scale, matrices, acting, terms, seen, pulled):
     """
     rates, outer, inner = matrices
     engaged, stiffness = acting
-    width = stiffness.shape[2]
     forces = np.zeros(seen.shape[1:])
     for k in range(ORDER):
         add_product(1.0, inner, terms[k], seen[k])
         for element in range(seen.shape[1]):
-            for begin in range(0, seen.shape[2], width):
-                part = pulled[k, element, begin : begin + width]
-                for j in range(k + 1):
-                    row = seen[j, element, begin : begin + width]
-                    if width == TOGETHER:
-                        for at in range(TOGETHER):
-                            part[at] += stiffness[element, k - j, at] * row[at]
-                    else:
-                        for at in range(width):
-                            part[at] += stiffness[element, k - j, at] * row[at]
-                for at in range(width):
-                    forces[element, begin + at] = engaged[element] * part[at]
+            pull(k, element, stiffness, seen, pulled)
+            for at in range(seen.shape[2]):
+                forces[element, at] = engaged[element] * pulled[k, element, at]
         add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
         add_product(scale / (k + 1), outer, forces, terms[k + 1])
+
+
+@part
+def pull(k, element, stiffness, seen, pulled):
+    """Add term k of the product of K and the series ``seen`` of an element; see `solve`."""
+    (_, elements, size), width = seen.shape, stiffness.shape[2]
+    for begin in range(0, size, width):
+        first = (k * elements + element) * size + begin
+        for j in range(k + 1):
+            source = (j * elements + element) * size + begin
+            factor = (element * stiffness.shape[1] + k - j) * width
+            if width == TOGETHER:
+                add_products(pulled, first, stiffness, factor, seen, source)
+            else:
+                for at in range(width):
+                    value = stiffness[element, k - j, at] * seen[j, element, begin + at]
+                    pulled[k, element, begin + at] += value
 
 
 @maker
@@ -453,16 +468,17 @@ def combined(matrix, series):
 def multiplied(a, b):
     """Return the products of the matrices of every step; the last axis is that of steps."""
     apart()
-    target = np.zeros((a.shape[0], b.shape[1], b.shape[2]))
+    columns, width = b.shape[1], b.shape[2]
+    target = np.zeros((a.shape[0], columns, width))
     for line in range(a.shape[0]):
         for source in range(b.shape[0]):
-            for column in range(b.shape[1]):
-                if b.shape[2] == TOGETHER:
-                    # A constant length: the loop becomes one vector.
-                    for at in range(TOGETHER):
-                        target[line, column, at] += a[line, source, at] * b[source, column, at]
+            for column in range(columns):
+                if width == TOGETHER:
+                    first = (line * columns + column) * width
+                    factor = (line * a.shape[1] + source) * width
+                    add_products(target, first, a, factor, b, (source * columns + column) * width)
                 else:
-                    for at in range(b.shape[2]):
+                    for at in range(width):
                         target[line, column, at] += a[line, source, at] * b[source, column, at]
     return target
 
@@ -494,5 +510,10 @@ def largest(matrix):
     most = 0.0
     for row in matrix:
         for number in row:
-            most = np.maximum(most, abs(number))
+            value = abs(number)
+            # The processor predicts this branch, whereas a maximum waits for the one before.
+            if not value <= most:
+                if math.isnan(value):
+                    return value
+                most = value
     return most
