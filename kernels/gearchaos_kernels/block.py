@@ -32,6 +32,7 @@ from gearchaos_kernels.methods.protocol import (
     begin_lane,
     maps_per_step,
     resolve,
+    room,
     take_step,
     workspace,
 )
@@ -112,9 +113,9 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
     about = batch.blocks[number_of_block]
     first, lanes, steps, maps_at = about[0], about[1], about[2], about[3]
     recorded_periods = about[4]
-    memory = aligned_memory(rows(scene).total + plan.more_rows)
+    memory = aligned_memory(max(rows(scene).total + plan.more_rows, room(scene)))
     lacked, progress = stops_of(number_of_block, batch, scene)
-    given = StepInputs(tables, batch.maps, workspace(scene), about[5:], lacked)
+    given = StepInputs(tables, batch.maps, workspace(memory, scene), about[5:], lacked)
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     substeps = steps // plan.steps_per_period
@@ -205,7 +206,7 @@ def keep_progress(memory, block, progress, period, scene):
 @scalar
 def copy_progress(source, target, block, scene):
     """Copy the memory of a block, except for coefficients, which are constant."""
-    for row in range(source.shape[0] // STRIDE):
+    for row in range(min(source.shape[0], target.shape[0]) // STRIDE):
         if rows(scene).coefficients <= row < rows(scene).branches:
             continue
         # Estimates of a controller are side by side.

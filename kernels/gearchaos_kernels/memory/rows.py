@@ -25,7 +25,10 @@ LANES = 4 * VECTOR
 """Slots of one block: a few vectors wide, small enough for the first-level cache."""
 
 STRIDE = LANES + 8
-"""Distance between rows, such that rows are not a multiple of 4096 bytes apart (cache sets)."""
+"""Distance between rows, such that rows are not a multiple of 4096 bytes apart (cache sets).
+
+A method may use the slots beyond the lanes, see `Method.workspace`.
+"""
 
 
 class State(NamedTuple):

@@ -95,8 +95,11 @@ class Method:
         `gaps.gap_polynomials`.
     maps_per_step(scene)
         Returns how many numbers are prepared for one step.
-    workspace(scene)
-        Returns what one block needs besides its memory.
+    room(scene)
+        Returns the fewest rows that the memory of a block must have.
+    workspace(memory, scene)
+        Returns what one block needs besides its memory. It may use the slots between ``LANES`` and
+        ``STRIDE`` of every row.
     begin_lane(memory, slot, index, lane, given, scene)
         Prepares a lane before its first step; ``index``: its number among all lanes.
     change_input(memory, slot, lane, scene)
@@ -126,6 +129,7 @@ class Method:
     is_kept: Callable[[Any, Plan, Scene], bool]
     gap_terms: Callable[..., Floats] | None
     maps_per_step: Any
+    room: Any
     workspace: Any
     begin_lane: Any
     change_input: Any
@@ -181,6 +185,7 @@ class StepInputs(NamedTuple):
     lacked: Any
 
 
+room = Interface("method", "room")
 workspace = Interface("method", "workspace")
 begin_lane = Interface("method", "begin_lane")
 change_input = Interface("method", "change_input")

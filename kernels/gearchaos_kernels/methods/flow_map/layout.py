@@ -35,7 +35,8 @@ class Work(NamedTuple):
     Attributes
     ----------
     aside : array
-        Memory of eight lanes that cross, with the rows of a block and those of `Aside`.
+        Memory of eight lanes that cross, with the rows of a block and those of `Aside`. It is the
+        memory of the block from slot ``LANES`` on.
     slots : array of int, shape (LANES,)
         Slots of all lanes that cross. Unsigned, because a signed index is checked for its sign.
     numbers : array

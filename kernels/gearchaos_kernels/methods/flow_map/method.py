@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gearchaos_kernels.compilation import maker, scalar
-from gearchaos_kernels.memory.block_memory import aligned_memory, slots_of
+from gearchaos_kernels.memory.block_memory import slots_of
 from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.flow_map.along import gap_terms
 from gearchaos_kernels.methods.flow_map.crossings import resolve
@@ -72,10 +72,17 @@ def maps_per_step(scene):
     return layout(scene).step_size
 
 
+@scalar
+def room(scene):
+    """Return the number of rows of lanes that cross."""
+    return aside_rows(scene).total
+
+
 @maker
-def workspace(scene):
+def workspace(memory, scene):
     """Return memory for lanes that cross, and for the only lane of a block."""
-    aside = aligned_memory(aside_rows(scene).total)
+    # Next to the lanes of the block: memory of its own would not fit into the first-level cache.
+    aside = memory[LANES:]
     for number in range(aside.shape[0]):
         aside[number] = 0.0
     return Work(aside, np.zeros(LANES, dtype=np.uint32), np.zeros(layout(scene).workspace))
@@ -111,6 +118,7 @@ FLOW_MAP = Method(
     is_kept=maps_are_kept,
     gap_terms=gap_terms,
     maps_per_step=maps_per_step,
+    room=room,
     workspace=workspace,
     begin_lane=begin_lane,
     change_input=change_input,

@@ -88,7 +88,13 @@ def maps_per_step(scene):
 
 
 @scalar
-def workspace(scene):
+def room(scene):
+    """Return 0: a block has the rows of its scene."""
+    return 0
+
+
+@scalar
+def workspace(memory, scene):
     """Return nothing: the series are rows of the block."""
     return
 
@@ -196,6 +202,7 @@ TAYLOR = Method(
     is_kept=lambda _system, _plan, _scene: True,
     gap_terms=None,
     maps_per_step=maps_per_step,
+    room=room,
     workspace=workspace,
     begin_lane=begin_lane,
     change_input=change_input,
