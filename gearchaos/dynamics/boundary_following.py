@@ -30,6 +30,12 @@ SIDE_BY_SIDE, MOST_AHEAD = 16, 2
 SMOOTH, TURN = 0.9, 0.3
 """Least cosine between tangents of successive points, and the angle in rad that steps aim at."""
 
+BEND = 0.07
+"""Largest difference between the direction from one point to the next and their mean tangent.
+
+On an arc both are equal. A step to another curve nearby, with about the same tangent, is refused.
+"""
+
 ASIDE = 0.3
 """Largest share of a step by which a point may lie aside of its prediction."""
 
@@ -149,6 +155,8 @@ def _joined(
         # A start at the edge is found again; the half on its other side must not meet it.
         half.end = EDGE
         return 0.0
+    if _bends(here, trial):
+        return None
     met = _met(here, trial, half, halves)
     if met is not None:
         half.met, met.met, met.end = met, half, ""
@@ -157,6 +165,15 @@ def _joined(
     half.end = EDGE if at_edge else _end_at(points)
     turn = float(np.arccos(min(float(trial.tangent @ here.tangent), 1.0)))
     return length * min(max(TURN / max(turn, 1e-9), 0.5), 2.0)
+
+
+def _bends(here: OnBoundary, trial: OnBoundary) -> bool:
+    """Whether two points are no neighbours on one smooth curve."""
+    chord, mean = trial.place - here.place, trial.tangent + here.tangent
+    lengths = np.linalg.norm(chord), np.linalg.norm(mean)
+    if not min(lengths) > 0.0:
+        return True
+    return bool(np.linalg.norm(chord / lengths[0] - mean / lengths[1]) > BEND)
 
 
 def _passes_half(here: OnBoundary, trial: OnBoundary) -> bool:
