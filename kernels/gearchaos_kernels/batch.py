@@ -235,10 +235,9 @@ def _actuation(
     about = np.array([column, plan.first_period, control.begins, control.repeats, noisy])
     given = {name: getattr(control, name) for name in Actuation._fields if name in control._fields}
     given |= {name: _lines(getattr(control, name)) for name in ("points", "gain", "response")}
-    correction = np.zeros_like(control.transition)
-    correction[..., control.measured] = control.correction
-    for name, matrices in ("transition", control.transition), ("correction", correction):
-        given[f"columns_of_{name}"] = _lines(matrices.swapaxes(2, 3))
+    for name in "transition", "correction":
+        given[f"columns_of_{name}"] = _lines(getattr(control, name).swapaxes(2, 3))
+    given["measured"] = np.ascontiguousarray(control.measured)
     # A column of its own: lanes are neighbours in it.
     steady = np.ascontiguousarray(coefficients[:, column])
     strength = system.input_strength(step)

@@ -128,7 +128,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, control, scen
             keep_progress(memory, block, progress, period, scene)
         recorded = period - plan.transient_periods
         if scene.control is not None:
-            act(memory, block, period, batch, control, given, scene)
+            act(memory, block, period, batch, control, scene)
         clock = Clock(period, 0, steps, substeps, recorded, periods - 1 - period)
         begin_record(memory, block, clock, records, scene)
         for number in range(steps):
@@ -270,7 +270,7 @@ def scale_tangents(memory, block, batch, steps_done, last, scene):
             square += (memory[(first + column) * STRIDE + slot] * scale[column]) ** 2
         length = math.sqrt(square)
         if scene.control is not None:
-            scale_variations(memory, slot, length, scene)
+            scale_variations(memory, slot, 1.0 / length, scene)
         for column in range(scale.shape[0]):
             part = memory[(first + column) * STRIDE + slot] / length
             # Flush tiny components before they become denormal.

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.block_memory import read_lane, slots_of
 from gearchaos_kernels.memory.lines import (
+    add_line,
     correct_line,
     gather_line,
     predict_line,
@@ -91,11 +92,14 @@ class Feedback:
         Mesh periods of a delayed feedback; 0 for a target orbit.
     states : int
         Number of states.
+    signals : int
+        Number of measured states from which an estimate is corrected, otherwise 0.
     """
 
     estimated: Any
     delay: int
     states: int
+    signals: int
 
 
 class Control(NamedTuple):
@@ -252,7 +256,8 @@ class Control(NamedTuple):
         True
         """
         estimated = True if self.transition.shape[1] else None
-        return Feedback(estimated, self.delay, self.points.shape[2])
+        signals = self.measured.size if estimated else 0
+        return Feedback(estimated, self.delay, self.points.shape[2], signals)
 
 
 OF_LANES = (
@@ -282,8 +287,8 @@ class Actuation(NamedTuple):
         See `Control`.
     columns_of_transition : array, shape (lanes, points or 0, states, line)
         `Control.transition` with its columns as rows.
-    columns_of_correction : array, shape (lanes, points or 0, states, line)
-        `Control.correction` with its columns as rows, and zeros for states that are not measured.
+    columns_of_correction : array, shape (lanes, points or 0, signals, line)
+        `Control.correction` with its columns as rows.
     steady : array, shape (lanes,)
         The steady input of a lane, per step squared, without control.
     strength : array, shape (lanes,)
@@ -313,7 +318,7 @@ class Actuation(NamedTuple):
 
 
 @scalar
-def act(memory, block, period, batch, control, given, scene):
+def act(memory, block, period, batch, control, scene):
     """Choose the input of all lanes of a block for a mesh period, and its variation.
 
     ``control``: the `Actuation`.
@@ -382,40 +387,43 @@ def measure(memory, slot, index, moment, control, scales, scene):
 
     ``moment``: number of the mesh period, and the phase of the excitation in mesh periods.
     """
-    at, tangent, place = (
-        control_rows(scene),
-        rows(scene).tangent,
-        index * control_rows(scene).states,
-    )
+    at, tangent = control_rows(scene), rows(scene).tangent
     known, known_varied = line_at(at.known, slot, scene), line_at(at.known_varied, slot, scene)
-    seen, seen_varied = known, known_varied
-    if scene.feedback.estimated is not None:
-        seen, seen_varied = at.measured * STRIDE, at.measured_varied * STRIDE
-    gather_line(memory, seen, STATE, slot, scales, place, scene)
-    if scene.tangent is not None:
-        gather_line(memory, seen_varied, tangent, slot, scales, place, scene)
-    if control.about[4] > 0:
-        add_noise(memory, seen, index, moment[0], control)
+    sizes, first = (scales, index * at.states), 0
     if scene.feedback.estimated is not None:
         nearest = nearest_point(memory, slot, moment[1], control, index, scene)
-        columns, place = (
-            control.columns_of_correction,
-            place_of((index, nearest), control) * at.line,
-        )
-        correct_line(memory, known, seen, columns, place, scene)
+        first = place_of((index, nearest), control) * control.measured.shape[0] * at.line
+        measured, correction = control.measured, (control.columns_of_correction, first)
+        correct_line(memory, known, (STATE, slot), sizes, measured, correction, scene)
         if scene.tangent is not None:
-            correct_line(memory, known_varied, seen_varied, columns, place, scene)
+            varied = tangent, slot
+            correct_line(memory, known_varied, varied, sizes, measured, correction, scene)
+    else:
+        gather_line(memory, known, (STATE, slot), sizes, scene)
+        if scene.tangent is not None:
+            gather_line(memory, known_varied, (tangent, slot), sizes, scene)
+    if control.about[4] > 0:
+        add_noise(memory, known, (index, first), moment[0], control, scene)
 
 
 @scalar
-def add_noise(memory, measured, index, period, control):
-    """Add the noise of the measured states of a lane in a mesh period."""
-    signals = control.measured.shape[0]
+def add_noise(memory, known, place, period, control, scene):
+    """Add what the noise of the measured states changes.
+
+    ``known``: the line of what is known of the state; ``place``: the lane, and where its correction
+    begins; ``period``: number of the mesh period.
+    """
+    (index, first), at = place, control_rows(scene)
+    signals, columns = control.measured.shape[0], control.columns_of_correction
     for signal in range(signals):
         noise = control.noise[index, signal]
         if noise > 0.0:
-            number = gaussian(control.seeds[index], period * signals + signal)
-            memory[measured + control.measured[signal]] += noise * number
+            state = control.measured[signal]
+            number = noise * gaussian(control.seeds[index], period * signals + signal)
+            if scene.feedback.estimated is not None:
+                add_line(memory, known, number, columns, first + signal * at.line, scene)
+            else:
+                memory[known + state] += number
 
 
 @scalar
@@ -523,14 +531,14 @@ def move_back(memory, slot, number, sources, scene):
 
 
 @scalar
-def scale_variations(memory, slot, length, scene):
-    """Divide all variations of the controller by the length of the tangent vector."""
-    at, inverse = control_rows(scene), 1.0 / length
-    memory[at.varied * STRIDE + slot] *= inverse
+def scale_variations(memory, slot, factor, scene):
+    """Multiply all variations of the controller by a factor, with the tangent vector."""
+    at = control_rows(scene)
+    memory[at.varied * STRIDE + slot] *= factor
     if scene.feedback.estimated is not None:
-        scale_line(memory, line_at(at.known_varied, slot, scene), inverse, scene)
+        scale_line(memory, line_at(at.known_varied, slot, scene), factor, scene)
     for number in range(at.delay * at.states):
-        memory[(at.earlier_varied + number) * STRIDE + slot] *= inverse
+        memory[(at.earlier_varied + number) * STRIDE + slot] *= factor
 
 
 @scalar

@@ -75,8 +75,12 @@ class _Line:
         order = ir.Constant(ir.VectorType(index, self.width), [index(number)] * self.width)
         return self.builder.shuffle_vector(vector, ir.Constant(self.kind, ir.Undefined), order)
 
-    def gather(self, array: int, row: int, slot: int) -> Any:
-        """Collect the numbers of one slot from consecutive rows of a block."""
+    def gather(self, array: int, states: int, scales: int) -> Any:
+        """Collect the states of one slot, times their scales.
+
+        ``states``: the first row, and the slot; ``scales``: an array, and where they begin in it.
+        """
+        row, slot = self.parts(states)
         first = self.builder.mul(self.arguments[row][1], self.arguments[row][1].type(STRIDE))
         first = self.builder.add(first, self.arguments[slot][1])
         self.arguments += ((types.intp, first),)
@@ -85,7 +89,7 @@ class _Line:
         for number in range(self.states):
             one = self.builder.load(self.address(array, begin, number * STRIDE))
             vector = self.builder.insert_element(vector, one, ir.IntType(32)(number))
-        return vector
+        return self.builder.fmul(vector, self.load_states(*self.parts(scales)), flags=_FLAGS)
 
     def total(self, vector: Any) -> Any:
         """Return the sum of the components of a vector, in pairs."""
@@ -99,11 +103,21 @@ class _Line:
             parts = [self.builder.fadd(a, b, flags=_FLAGS) for a, b in pairs] + odd
         return parts[0]
 
+    def number(self, array: int, place: Any, further: int = 0) -> Any:
+        """Load one number of an array, at a place that is known at run time, or from its begin."""
+        kind, value = self.arguments[array]
+        first = first_element(self.context, self.builder, kind, value)
+        place = ir.IntType(64)(further) if place is None else place
+        return self.builder.load(self.builder.gep(first, [place]))
+
+    def spread_number(self, number: Any) -> Any:
+        """Return a vector whose components all equal a number."""
+        nothing = ir.Constant(self.kind, ir.Undefined)
+        return self.spread(self.builder.insert_element(nothing, number, ir.IntType(32)(0)), 0)
+
     def argument(self, number: int) -> Any:
         """Return a vector whose components all equal an argument."""
-        index, nothing = ir.IntType(32), ir.Constant(self.kind, ir.Undefined)
-        given = self.arguments[number][1]
-        return self.spread(self.builder.insert_element(nothing, given, index(0)), 0)
+        return self.spread_number(self.arguments[number][1])
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
         """Return a b + c."""
@@ -126,17 +140,28 @@ class _Line:
 
 
 @intrinsic
-def gather_line(_typing, memory, target, row, slot, array, at, scene):
-    """Store the numbers of one slot in consecutive rows, times numbers of an array."""
+def gather_line(_typing, memory, target, states, scales, scene):
+    """Store the states of one slot, times their scales; see `_Line.gather`."""
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        numbers = builder.fmul(line.gather(0, 2, 3), line.load_states(4, 5), flags=_FLAGS)
-        line.store(numbers, 0, 1)
+        line.store(line.gather(0, 2, 3), 0, 1)
         return context.get_dummy_value()
 
-    place = types.intp
-    return types.void(memory, place, place, place, array, place, scene), generate
+    return types.void(memory, types.intp, states, scales, scene), generate
+
+
+@intrinsic
+def add_line(_typing, memory, target, factor, array, at, scene):
+    """Add the numbers of an array, from a place on, times a factor."""
+
+    def generate(context, builder, signature, arguments):
+        line = _Line(context, builder, signature, arguments)
+        total = line.multiply_add(line.load(3, 4), line.argument(2), line.load(0, 1))
+        line.store(total, 0, 1)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, types.float64, array, types.intp, scene), generate
 
 
 @intrinsic
@@ -175,22 +200,34 @@ def product_of_deviation(_typing, memory, source, points, array, at, scene):
 
 
 @intrinsic
-def correct_line(_typing, memory, target, source, columns, place, scene):
-    """Correct an estimate z at ``target`` by what is measured, y at ``source``: z + L (y - z).
+def correct_line(_typing, memory, target, states, scales, measured, correction, scene):
+    """Correct an estimate z by measured states y of a slot without noise: z + L (y - z).
 
-    ``columns``: matrices L whose columns follow each other, in the order of the points; ``place``:
-    that of the point.
+    ``states`` and ``scales``: see `_Line.gather`; ``measured``: numbers of the measured states;
+    ``correction``: the columns of L after each other, and where they begin.
     """
 
     def generate(context, builder, signature, arguments):
         line = _Line(context, builder, signature, arguments)
-        estimate = line.load(0, 1)
-        error = builder.fsub(line.load(0, 2), estimate, flags=_FLAGS)
-        line.store(line.times(3, 4, error, estimate), 0, 1)
+        row, slot = line.parts(2)
+        sizes, first_size = line.parts(3)
+        columns, begin = line.parts(5)
+        total = line.load(0, 1)
+        for signal in range(signature.args[-1].scene.feedback.signals):
+            state = line.number(4, None, signal)
+            place = builder.add(line.arguments[row][1], state)
+            place = builder.mul(place, place.type(STRIDE))
+            value = line.number(0, builder.add(place, line.arguments[slot][1]))
+            size = line.number(sizes, builder.add(line.arguments[first_size][1], state))
+            estimate = line.number(0, builder.add(line.arguments[1][1], state))
+            error = builder.fsub(builder.fmul(value, size, flags=_FLAGS), estimate, flags=_FLAGS)
+            column = line.load(columns, begin, signal * line.width)
+            total = line.multiply_add(column, line.spread_number(error), total)
+        line.store(total, 0, 1)
         return context.get_dummy_value()
 
-    place = types.intp
-    return types.void(memory, place, place, columns, place, scene), generate
+    given = memory, types.intp, states, scales, measured, correction, scene
+    return types.void(*given), generate
 
 
 @intrinsic

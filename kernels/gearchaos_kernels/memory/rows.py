@@ -120,8 +120,6 @@ class ControlRows(NamedTuple):
     known, known_varied : int
         What the controller knows of the state of every lane, and the same of the tangent vector,
         as lines: that of slot s begins with number s * line. An estimate stays there.
-    measured, measured_varied : int
-        What is measured of one lane, as a line, from which its estimate is corrected.
     earlier, earlier_varied : int
         States of earlier mesh periods for a delayed feedback, and their variation.
     end : int
@@ -137,8 +135,6 @@ class ControlRows(NamedTuple):
     varied: int
     known: int
     known_varied: int
-    measured: int
-    measured_varied: int
     earlier: int
     earlier_varied: int
     end: int
@@ -164,9 +160,9 @@ def _control_sizes(scene: Scene) -> list[int]:
     if scene.control is None:
         return []
     line = line_of(scene.feedback.states)
-    lines, one_line = -(-LANES * line // STRIDE), -(-line // STRIDE)
+    lines = -(-LANES * line // STRIDE)
     earlier = scene.feedback.delay * scene.feedback.states
-    return [1, lines, lines, one_line, one_line, earlier, earlier]
+    return [1, lines, lines, earlier, earlier]
 
 
 @cache
