@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate
+from gearchaos_kernels import METHODS, LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
 from gearchaos.dynamics.curve_defects import Defect, Finding, Request, defects_of
@@ -168,6 +168,11 @@ class Curve(NamedTuple):
     scale: Floats
     ahead: int = 1
     own_maps: bool = False
+
+    @property
+    def exact(self) -> bool:
+        """Whether orbits are exact up to rounding."""
+        return METHODS[self.plan.method].always_resolved
 
     def through(self, point: Floats, share: float) -> Self:
         """Return the curve with the scales of the orbit with state ``point`` at a share of it."""

@@ -37,6 +37,7 @@ from gearchaos.records.branch import (
     FOLD,
     GRAZING,
     HALVING,
+    IN_ERRORS,
     LOST,
     NEIMARK_SACKER,
     PERIOD_DOUBLING,
@@ -67,8 +68,19 @@ RATIO = 1.6
 FALL = 2.5
 """The same where points were not found, such as next to a grazing: steps shrink by orders there."""
 
-ASIDE = 0.1
-"""Largest share of a step by which a point may lie aside of its prediction, on another branch."""
+ASIDE, ASIDE_BY_ERRORS = 0.2, 0.5
+"""Largest share of a step by which a point may lie aside of its prediction, on another branch.
+
+The second is for methods with an error: where a multiplier is near +1, the small errors of
+derivatives turn the tangent by much.
+"""
+
+JUMP = 1e-6
+"""Distance from its prediction at which a point is accepted however short the step.
+
+Within `DIFFERENCE` of a grazing, the tangent of a curve of exact maps has large errors. Where the
+steps of a method with an error begin to see a contact, its curve jumps.
+"""
 
 CALM = 0.5
 """Largest change of the sum of multipliers in a step, relative to 1 and the sum."""
@@ -90,6 +102,12 @@ Next to a branch point the equations are nearly singular.
 
 SAME_PLACE = 1e-7
 """Largest distance between two corrections of one point of a branch."""
+
+STALLED = (200, 1e-3)
+"""Number of successive points of a curve, and the distance that they must cover at least.
+
+Where errors of a method fold a curve at the size of its jumps, it leads nowhere.
+"""
 
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
@@ -165,7 +183,8 @@ class TracedBranch(NamedTuple):
                 if distance > tolerance:
                     # Between two of its points, the branch is not straight.
                     one, other = self.places[at : at + 2]
-                    found = yield from _abreast(self.curve, one, other, target)
+                    direction = (other - one) / np.linalg.norm(other - one)
+                    found = yield from _abreast(self.curve, one, direction, target)
                     if found is not None:
                         distance = float(np.max(np.abs(found.place - target)))
                     elif distance <= UNDECIDED:
@@ -193,16 +212,15 @@ class TracedBranch(NamedTuple):
 
 
 def _abreast(
-    curve: Curve, one: Floats, other: Floats, target: Floats
+    curve: Curve, guess: Floats, direction: Floats, target: Floats
 ) -> Finding[CurvePoint | None]:
-    """Search the point of a curve in a plane through a target, next to a chord of the curve.
+    """Search the point of a curve in a plane through a target.
 
-    All are places (states + 1,); the chord leads from ``one`` to ``other``.
+    ``guess``: a place (states + 1,) next to the curve, which is moved along a ``direction`` of
+    length 1 into the plane.
     """
-    chord = other - one
-    direction = chord / np.linalg.norm(chord)
     normal = curve.plane(direction)
-    guess = one + float((target - one) @ normal) / float(chord @ normal) * chord
+    guess = guess + float((target - guess) @ normal) / float(direction @ normal) * direction
     return (yield from curve.correcting(guess, direction, normal))
 
 
@@ -237,8 +255,9 @@ def tracing(
     starts = [start] if one_way else [start, start._replace(tangent=-start.tangent)]
     (ahead, last), *back = yield from together([_half(curve, one) for one in starts])
     behind, first = back[0] if back else ([start], HALVING)
-    # One direction is enough for a closed curve, where the other may have been lost.
-    if last == CLOSED_CURVE:
+    # One direction is enough for a closed curve, where the other may have been lost or have passed
+    # its beginning.
+    if last == CLOSED_CURVE and (first != CLOSED_CURVE or len(ahead) <= len(behind)):
         behind, first = [start], last
     elif first == CLOSED_CURVE:
         ahead, last = [start], first
@@ -307,6 +326,8 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             if len(points) > 2 and (yield from _meets(curve, here, last, start)):
                 return [*points, *further], CLOSED_CURVE
             points += further
+        if taken and _stalls(points):
+            return points, _end_of(curve, points[-1])
         if leaves and taken == len(trials):
             return points, EDGE
         first = trials[0]
@@ -319,8 +340,27 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         longer = 0.5 if first is None else _boldness(here, first)
         distances = _shorter(float(distances[0]) * min(max(longer, 0.25), 0.8), curve.ahead)
         if distances[0] < SHORTEST_STEP:
-            return points, LOST
+            return points, _end_of(curve, here)
     return points, TOO_MANY
+
+
+def _end_of(curve: Curve, here: CurvePoint) -> str:
+    """Return why a curve ends that is not found beyond a point.
+
+    Errors of a method bend or hide the last part of a curve that has nearly reached the orbit of
+    half its period.
+    """
+    if here.half_return < SIDEWAYS:
+        return HALVING
+    return LOST if curve.exact else IN_ERRORS
+
+
+def _stalls(points: Sequence[CurvePoint]) -> bool:
+    """Whether the last points of a curve lead nowhere."""
+    many, distance = STALLED
+    if len(points) < many:
+        return False
+    return bool(np.linalg.norm(points[-1].place - points[-many].place) < distance)
 
 
 def _distances(step: float, many: int) -> Floats:
@@ -368,7 +408,8 @@ def _next(
     guesses, directions = extended(last, distances)
     inside = (guesses[:, -1] >= 0.0) & (guesses[:, -1] <= 1.0)
     within = distances.size if inside.all() else int(np.argmin(inside))
-    reaches = ASIDE * np.diff(distances, prepend=0.0)
+    aside = ASIDE if curve.exact else ASIDE_BY_ERRORS
+    reaches = np.maximum(aside * np.diff(distances, prepend=0.0), JUMP)
     searches = [
         curve.correcting(guess, direction, curve.plane(here.tangent, direction), reach=reach)
         for guess, direction, reach in zip(
@@ -448,7 +489,8 @@ def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint)
         along = float((target - here.place) @ chord) / length
         aside = np.linalg.norm(target - here.place - along / length * chord)
         if 0.0 <= along <= length and aside <= BULGE * length:
-            found = yield from _abreast(curve, here.place, trial.place, target)
+            (guess,) = cubic(here, trial, np.array([along / length]))
+            found = yield from _abreast(curve, guess, chord / length, target)
             if found is not None and np.max(np.abs(found.place - target)) < SAME_PLACE:
                 return True
     return False
@@ -536,17 +578,11 @@ def _located(
     bisects = abs(low) == abs(high) == 1.0
     nearest = one
     for number in range(MOST_TRIALS):
-        chord = other.place - one.place
-        length = float(np.linalg.norm(chord))
+        length = float(np.linalg.norm(other.place - one.place))
         if length <= located:
             break
         share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
-        share = min(max(share, 1e-3), 1.0 - 1e-3)
-        guess, direction = cubic(one, other, np.array([share]))[0], chord / length
-        normal = curve.plane(direction, one.tangent, other.tangent)
-        by_share = one.by_share + share * (other.by_share - one.by_share)
-        known = by_share if curve.own_maps and length <= SHORT else None
-        middle = yield from curve.correcting(guess, direction, normal, known)
+        middle = yield from _between(curve, one, other, min(max(share, 1e-3), 1.0 - 1e-3))
         if middle is None:
             return nearest if length < 1e-7 else None
         nearest, value = middle, function(middle)
@@ -559,3 +595,27 @@ def _located(
             other, high = middle, value
             low /= 2.0
     return nearest
+
+
+def _between(
+    curve: Curve, one: CurvePoint, other: CurvePoint, share: float
+) -> Finding[CurvePoint | None]:
+    """Search the point of a curve at a share of the chord between two points."""
+    chord = other.place - one.place
+    length = float(np.linalg.norm(chord))
+    direction = chord / length
+    normal = curve.plane(direction, one.tangent, other.tangent)
+    by_share = one.by_share + share * (other.by_share - one.by_share)
+    known = by_share if curve.own_maps and length <= SHORT else None
+    guess = cubic(one, other, np.array([share]))[0]
+    middle = yield from curve.correcting(guess, direction, normal, known)
+    if middle is not None:
+        return middle
+    # Next to a grazing the curve may have a corner, which lines from both sides come near to.
+    for side in (one, other):
+        along = float((guess - side.place) @ normal) / float(side.tangent @ normal)
+        line = side.place + along * side.tangent
+        middle = yield from curve.correcting(line, direction, normal)
+        if middle is not None:
+            break
+    return middle

@@ -24,7 +24,8 @@ EDGE, CLOSED_CURVE = "edge of the range", "closes on itself"
 HALVING = "meets the orbit of half its period"
 TOO_MANY = "too many points"
 LOST = "no orbit found however short the step"
-BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST)
+IN_ERRORS = "lost in the errors of the method: take shorter steps, or flow maps"
+BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST, IN_ERRORS)
 """Reasons why a branch ends."""
 
 

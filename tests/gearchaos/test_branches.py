@@ -11,8 +11,10 @@ import pytest
 import gearchaos
 from gearchaos.records.branch import (
     CLOSED_CURVE,
+    EDGE,
     FOLD,
     GRAZING,
+    IN_ERRORS,
     NEIMARK_SACKER,
     PERIOD_DOUBLING,
 )
@@ -142,13 +144,13 @@ def test_a_fold_next_to_a_grazing_point_is_told_from_it():
 
 
 @cache
-def isolated(frequency, state):
-    """Return the branch of period 4 through the motion at a frequency, beginning at a state."""
+def isolated(frequency, state, period=4):
+    """Return the branch of a period through the motion at a frequency, beginning at a state."""
     config = gearchaos.load_config(SWEEPS / "two_masses.toml", ['integration.method="flow_map"'])
     named = dict(zip(("x1", "x1_rate", "x2", "x2_rate"), state, strict=True))
     config = config.replace("start", {"kind": "given", "state": named})
     system = gearchaos.System(config, frequency=frequency)
-    return system.branch(system.orbit(4), "frequency", 0.55, 0.8)
+    return system.branch(system.orbit(period), "frequency", 0.55, 0.8)
 
 
 ONE = 0.618, (0.909, 0.326, 0.612, 0.223)
@@ -181,6 +183,37 @@ def test_an_isolated_branch_does_not_depend_on_where_it_was_begun():
     for kind in (FOLD, PERIOD_DOUBLING, GRAZING):
         assert len(of_kind(one, kind)) >= 2
         assert of_kind(one, kind) == pytest.approx(of_kind(other, kind), abs=1e-9)
+
+
+def test_a_branch_that_bends_at_grazing_points_is_passed_through_once():
+    # Within 1e-6 of two of them the curve turns by a large angle.
+    branch = isolated(0.5885, (1.00942842, -0.16202727, 0.61905147, 0.00197754), 7)
+    assert branch.ends == (CLOSED_CURVE, CLOSED_CURVE)
+    assert [len(of_kind(branch, kind)) for kind in (FOLD, PERIOD_DOUBLING, GRAZING)] == [2, 2, 4]
+
+
+def test_a_branch_of_rk4_reaches_the_edges_of_the_range_as_that_of_flow_maps_does():
+    # At 1.66 the motion touches a flank for less than a step, which RK4 does not see at first.
+    branches = []
+    for method in ("rk4", "flow_map"):
+        setting = f'integration.method="{method}"'
+        config = gearchaos.load_config(SWEEPS / "pan2021_first.toml", [setting])
+        system = gearchaos.System(config, pitch_error=2.0)
+        branches.append(system.branch(system.orbit(), "pitch_error", 0.0, 15.0))
+    rk4, exact = branches
+    assert rk4.ends == exact.ends == (EDGE, EDGE)
+    for kind, error in ((FOLD, 1e-4), (PERIOD_DOUBLING, 1e-4)):
+        assert of_kind(rk4, kind) == pytest.approx(of_kind(exact, kind), abs=error)
+
+
+def test_where_errors_hide_a_branch_its_end_says_so():
+    # A step takes 0.4 of the time in which the stop pushes the mass back.
+    setting = 'integration={ method="rk4", steps_per_period=70 }'
+    config = gearchaos.load_config(SWEEPS / "two_masses.toml", [setting])
+    config = config.replace("start", {"kind": "given", "state": {"x1_rate": 1.0, "x2": 0.5}})
+    system = gearchaos.System(config, frequency=0.7)
+    branch = system.branch(system.orbit(), "frequency", 0.55, 0.8)
+    assert branch.ends == (IN_ERRORS, IN_ERRORS)
 
 
 def test_stability_changes_at_special_points_only():
