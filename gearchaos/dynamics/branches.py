@@ -2,23 +2,16 @@
 
 A branch is one curve of orbits of one period (`arclength`). It is followed in both directions,
 around its folds and through losses of stability, until it leaves the range, closes on itself, or
-meets the orbit of half its period. Where a test function changes its sign between two points of a
-branch, there is a special point between them, which is then located on the curve:
-
-- fold: the parameter turns back;
-- branch point: a real multiplier passes +1 without a fold;
-- period doubling: a real multiplier passes -1;
-- Neimark-Sacker: a complex pair passes the unit circle;
-- grazing: an element begins or ceases to meet a flank.
+meets the orbit of half its period. Special points are then located on it (`branch_specials`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations, pairwise
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from gearchaos.arrays import Complex, Floats
+from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import (
     FIRST_STEP,
     SHORTEST_STEP,
@@ -28,21 +21,10 @@ from gearchaos.dynamics.arclength import (
     cubic,
     extended,
 )
+from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
-from gearchaos.records.branch import (
-    BRANCH_POINT,
-    CLOSED_CURVE,
-    EDGE,
-    FOLD,
-    GRAZING,
-    HALVING,
-    IN_ERRORS,
-    LOST,
-    NEIMARK_SACKER,
-    PERIOD_DOUBLING,
-    TOO_MANY,
-)
+from gearchaos.records.branch import CLOSED_CURVE, EDGE, HALVING, IN_ERRORS, LOST, TOO_MANY
 
 LONGEST = 0.1
 """Longest step along a branch."""
@@ -52,15 +34,6 @@ SMOOTH = 0.97
 
 MOST_POINTS = 12000
 """Largest number of points computed along one direction of a branch."""
-
-LOCATED = 1e-11
-"""Largest length of the stretch of a curve in which a special point lies."""
-
-SHORT = 0.01
-"""Length of such a stretch in which the derivative by the parameter is nearly linear."""
-
-MOST_TRIALS = 80
-"""Largest number of points with which a special point is located."""
 
 RATIO = 1.6
 """Ratio of the distances at which points ahead are predicted."""
@@ -269,8 +242,9 @@ def _with_specials(
     curve: Curve, points: list[CurvePoint], ends: tuple[str, str], located: float
 ) -> Finding[TracedBranch]:
     """Return the branch through points, with its special points located and among its points."""
+    points = yield from with_pairs_parted(curve, points)
     located_between = yield from together(
-        [_specials_between(curve, one, other, located) for one, other in pairwise(points)]
+        [specials_between(curve, one, other, located) for one, other in pairwise(points)]
     )
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
@@ -494,128 +468,3 @@ def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint)
             if found is not None and np.max(np.abs(found.place - target)) < SAME_PLACE:
                 return True
     return False
-
-
-def _test_functions(point: CurvePoint) -> dict[str, float]:
-    """Return the functions that change their sign at special points of each kind."""
-    multipliers = point.multipliers
-    pairs = [one * other - 1.0 for one, other in combinations(multipliers, 2)]
-    return {
-        FOLD: float(point.tangent[-1]),
-        BRANCH_POINT: float(np.prod(multipliers - 1.0).real),
-        PERIOD_DOUBLING: float(np.prod(multipliers + 1.0).real),
-        NEIMARK_SACKER: float(np.prod(pairs).real) if pairs else 1.0,
-    }
-
-
-def _specials_between(
-    curve: Curve, one: CurvePoint, other: CurvePoint, located: float
-) -> Finding[list[tuple[str, CurvePoint, int]]]:
-    """Search kind, point and flank of the special points between two points of a curve."""
-    sought = [*_changes_of_sign(one, other), *_changes_of_impacts(one, other)]
-    points = yield from together(
-        [_located(curve, one, other, function, located) for _, function, _ in sought]
-    )
-    return [
-        (kind, point, flank)
-        for (kind, _, flank), point in zip(sought, points, strict=True)
-        if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers))
-    ]
-
-
-_Sought = tuple[str, Callable[[CurvePoint], float], int]
-"""Kind of a special point, the function that changes its sign there, and the flank or -1."""
-
-
-def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
-    """Yield the kinds of special points of the multipliers between two points."""
-    before, after = _test_functions(one), _test_functions(other)
-    for kind in before:
-        if before[kind] * after[kind] >= 0.0:
-            continue
-        if kind == BRANCH_POINT and before[FOLD] * after[FOLD] < 0.0:
-            # A multiplier passes +1 at every fold.
-            continue
-
-        def test_function(at: CurvePoint, kind: str = kind) -> float:
-            return _test_functions(at)[kind]
-
-        yield kind, test_function, -1
-
-
-def _has_pair_on_circle(multipliers: Complex) -> bool:
-    """Whether the pair of multipliers whose product is nearest to 1 is complex, not real."""
-    pairs = list(combinations(multipliers.tolist(), 2))
-    nearest = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
-    return bool(nearest[0].imag != 0.0)
-
-
-def _changes_of_impacts(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
-    """Yield the flanks on which impacts appear or vanish between two points."""
-    for flank, (before, after) in enumerate(zip(one.impacts, other.impacts, strict=True)):
-        if before == after:
-            continue
-
-        def changed(at: CurvePoint, flank: int = flank, before: int = before) -> float:
-            return 1.0 if at.impacts[flank] == before else -1.0
-
-        yield GRAZING, changed, flank
-
-
-def _located(
-    curve: Curve,
-    one: CurvePoint,
-    other: CurvePoint,
-    function: Callable[[CurvePoint], float],
-    located: float,
-) -> Finding[CurvePoint | None]:
-    """Search the point between two points of a curve at which a function changes its sign.
-
-    The method of false position with halved values (Illinois), or bisection where the function only
-    has a sign. None if a point between them is not found.
-    """
-    low, high = function(one), function(other)
-    bisects = abs(low) == abs(high) == 1.0
-    nearest = one
-    for number in range(MOST_TRIALS):
-        length = float(np.linalg.norm(other.place - one.place))
-        if length <= located:
-            break
-        share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
-        middle = yield from _between(curve, one, other, min(max(share, 1e-3), 1.0 - 1e-3))
-        if middle is None:
-            return nearest if length < 1e-7 else None
-        nearest, value = middle, function(middle)
-        if value == 0.0:
-            break
-        if (value > 0.0) == (low > 0.0):
-            one, low = middle, value
-            high /= 2.0
-        else:
-            other, high = middle, value
-            low /= 2.0
-    return nearest
-
-
-def _between(
-    curve: Curve, one: CurvePoint, other: CurvePoint, share: float
-) -> Finding[CurvePoint | None]:
-    """Search the point of a curve at a share of the chord between two points."""
-    chord = other.place - one.place
-    length = float(np.linalg.norm(chord))
-    direction = chord / length
-    normal = curve.plane(direction, one.tangent, other.tangent)
-    by_share = one.by_share + share * (other.by_share - one.by_share)
-    known = by_share if curve.own_maps and length <= SHORT else None
-    guess = cubic(one, other, np.array([share]))[0]
-    middle = yield from curve.correcting(guess, direction, normal, known)
-    if middle is not None:
-        return middle
-    # Next to a grazing the curve may have a corner, which lines from both sides come near to.
-    for side in (one, other):
-        along = float((guess - side.place) @ normal) / float(side.tangent @ normal)
-        line = side.place + along * side.tangent
-        middle = yield from curve.correcting(line, direction, normal)
-        if middle is not None:
-            break
-    return middle

@@ -10,8 +10,8 @@ from gearchaos_kernels import LaneSystem, integrate
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
+from gearchaos.dynamics.branch_specials import LOCATED
 from gearchaos.dynamics.branches import (
-    LOCATED,
     SIDEWAYS,
     Special,
     TracedBranch,
