@@ -59,7 +59,8 @@ class BoundariesOptions(NamedTuple):
         int,
         Option(
             "lines across the map from which curves are started besides the changes of the map; "
-            "more lines find smaller closed curves (default: %(default)s)",
+            "more lines find smaller closed curves (default: %(default)s in each direction, but "
+            "one in a direction in which every value needs flow maps of its own)",
             "N",
             low=1,
             high=1000,

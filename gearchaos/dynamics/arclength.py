@@ -377,6 +377,15 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
     return ahead + step**2 * square + step**3 * cube, tangents
 
 
+def stalls(places: Sequence[Floats], least: tuple[int, float]) -> bool:
+    """Whether the last places of a curve lead nowhere.
+
+    ``least``: a number of successive places, and the distance that they cover at least.
+    """
+    many, distance = least
+    return len(places) >= many and bool(np.linalg.norm(places[-1] - places[-many]) < distance)
+
+
 def cubic(one: OnCurve, other: OnCurve, share: Floats) -> Floats:
     """Return the cubic through two points and their tangents at shares of the way, (shares, n)."""
     length = np.linalg.norm(other.place - one.place)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.dynamics.arclength import cubic, extended
+from gearchaos.dynamics.arclength import cubic, extended, stalls
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
@@ -41,6 +41,12 @@ ASIDE = 0.3
 
 MOST_POINTS = 1000
 """Largest number of points computed along one direction of a boundary."""
+
+STALLED = (40, 1e-3)
+"""Number of successive points of a boundary, and the distance that they must cover at least.
+
+Next to a grazing, steps may become so short that the boundary leads nowhere.
+"""
 
 SAME_CURVE, SAME_PLACE = 2e-3, 1e-6
 """Largest distance of halves that meet, relative to a step if that is longer, and of one start."""
@@ -132,7 +138,9 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
             step = min(longer, LONGEST)
             if half.end or half.met is not None:
                 return
-        if len(points) == before:
+        if not half.end and stalls([one.place for one in points[-STALLED[0] :]], STALLED):
+            half.end = _why_lost(equations, points[-1])
+        elif len(points) == before:
             here, step = points[-1], step / 2.0
             if trials[0] is not None and _passes_half(here, trials[0]):
                 half.end = HALVING if _nearly_half(here) else ""

@@ -372,7 +372,7 @@ def nearest_extremes(
     turns = rate[:, :-1] * rate[:, 1:] <= 0.0
     aside = np.abs(np.arange(turns.shape[1]) + 0.5 - phases[:, np.newaxis])
     aside = np.minimum(aside, turns.shape[1] - aside)
-    away = np.where(np.isnan(aside), np.abs(value[:, :-1] - flank[:, np.newaxis]), aside)
+    away = np.where(np.isnan(aside), np.abs(_extremes(value, rate) - flank[:, np.newaxis]), aside)
     samples = np.argmin(np.where(turns, away, np.inf), axis=1)
     terms = gap_polynomials(system, plan, history, gaps, (samples, element))
     begin, end = (rate[np.arange(samples.size), samples + n] for n in (0, 1))
@@ -382,6 +382,21 @@ def nearest_extremes(
     beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - flank
     there = turns.any(axis=1)
     return np.where(there, beyond, np.nan), samples + 0.5 * (at + 1.0)
+
+
+def _extremes(value: Floats, rate: Floats) -> Floats:
+    """Return about where gaps have their extreme within each step, (lanes, samples - 1).
+
+    ``value`` and ``rate`` per step (lanes, samples): those at the ends of steps. It is the cubic
+    through them, at the zero of the straight line through both rates.
+    """
+    begin, end = rate[:, :-1], rate[:, 1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.clip(np.nan_to_num(begin / (begin - end)), 0.0, 1.0)
+    rise = value[:, 1:] - value[:, :-1]
+    cubed = begin + end - 2.0 * rise
+    squared = 3.0 * rise - 2.0 * begin - end
+    return np.asarray(value[:, :-1] + at * (begin + at * (squared + at * cubed)))
 
 
 def _turning(terms: Floats, at: Floats) -> Floats:

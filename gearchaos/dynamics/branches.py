@@ -20,6 +20,7 @@ from gearchaos.dynamics.arclength import (
     along_the_way,
     cubic,
     extended,
+    stalls,
 )
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
 from gearchaos.dynamics.curve_defects import Finding, defects_of
@@ -300,7 +301,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             if len(points) > 2 and (yield from _meets(curve, here, last, start)):
                 return [*points, *further], CLOSED_CURVE
             points += further
-        if taken and _stalls(points):
+        if taken and stalls([one.place for one in points[-STALLED[0] :]], STALLED):
             return points, _end_of(curve, points[-1])
         if leaves and taken == len(trials):
             return points, EDGE
@@ -327,14 +328,6 @@ def _end_of(curve: Curve, here: CurvePoint) -> str:
     if here.half_return < SIDEWAYS:
         return HALVING
     return LOST if curve.exact else IN_ERRORS
-
-
-def _stalls(points: Sequence[CurvePoint]) -> bool:
-    """Whether the last points of a curve lead nowhere."""
-    many, distance = STALLED
-    if len(points) < many:
-        return False
-    return bool(np.linalg.norm(points[-1].place - points[-many].place) < distance)
 
 
 def _distances(step: float, many: int) -> Floats:

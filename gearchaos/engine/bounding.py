@@ -8,18 +8,19 @@ import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Complex, Floats, Integers
-from gearchaos.dynamics.arclength import CurvePoint
+from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_range import BranchRange, only_map_parameter
 from gearchaos.dynamics.branches import Special, TracedBranch
+from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
-from gearchaos.dynamics.side_by_side import run, together
+from gearchaos.dynamics.side_by_side import Found, run, together
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
-from gearchaos.engine.map_changes import Changes, MapChange, changes_of
+from gearchaos.engine.map_changes import JUMP, Changes, MapChange, changes_of
 from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
@@ -117,11 +118,7 @@ def find_boundaries(
     search = _BoundarySearch(
         over, plan_run(for_continuation(_small(config, PARAMETERS))), longest, result
     )
-    places = [
-        (number, float(share))
-        for number in search.axes_of_lines()
-        for share in (np.arange(lines) + 0.5) / lines
-    ]
+    places = search.lines(lines)
     with one_thread(), progress(len(places), unit="lines") as bar:
         try:
             search.begin_with_changes(result)
@@ -193,9 +190,11 @@ class _Ranges(NamedTuple):
         """Return the range along a line, which has a number among others."""
 
         def systems(numbers: Integers, shares: Floats) -> LaneSystem:
-            values = self.values(np.repeat(shares[:, np.newaxis], PARAMETERS, axis=1))
-            at = np.array([one.number for one in lines])[numbers]
-            values[np.arange(at.size), at] = np.array([one.value for one in lines])[numbers]
+            values = np.empty((numbers.size, PARAMETERS))
+            fixed, value, low, high = np.array([one[:4] for one in lines])[numbers].T
+            at = fixed.astype(np.intp)
+            values[np.arange(at.size), at] = value
+            values[np.arange(at.size), 1 - at] = low + shares * (high - low)
             columns = dict(zip(self.parameters, values.T, strict=True))
             return system_of(self.config, columns, self.config.needed_effects)
 
@@ -204,17 +203,40 @@ class _Ranges(NamedTuple):
             values[self.parameters[line.number]] = np.full(at.size, line.value)
             return system_of(self.config, values, self.config.needed_effects)
 
-        low, high = (float(ends[1 - line.number]) for ends in (self.low, self.high))
-        return BranchRange(systems_of, low, high, number, systems)
+        return BranchRange(systems_of, line.low, line.high, number, systems)
+
+    def whole(self, number: int, shares: Floats) -> "_Line":
+        """Return the line across the map through a place at shares (2,), see `_Line`."""
+        value = float(self.values(shares)[number])
+        return _Line(number, value, float(self.low[1 - number]), float(self.high[1 - number]))
+
+    def across(self, change: MapChange) -> "_Line":
+        """Return the line through both cells of a change of the map, and one cell beyond each."""
+        line = self.whole(change.number, change.shares)
+        here, beside = (one[1 - change.number] for one in (change.shares, change.other))
+        ends = np.clip(np.sort([2.0 * here - beside, 2.0 * beside - here]), 0.0, 1.0)
+        low, high = (float(self.values(np.full(PARAMETERS, one))[1 - line.number]) for one in ends)
+        return line._replace(low=low, high=high)
+
+    def along(self, line: "_Line", shares: Floats) -> float:
+        """Return the share of a line at which a place lies, at shares (2,) of both ranges."""
+        return float((self.values(shares)[1 - line.number] - line.low) / (line.high - line.low))
+
+    def shares(self, line: "_Line", along: float) -> Floats:
+        """Return the shares of both ranges, (2,), at a share of a line."""
+        values = np.full(PARAMETERS, line.low + along * (line.high - line.low))
+        values[line.number] = line.value
+        shares: Floats = (values - self.low) / (self.high - self.low)
+        return shares
 
 
 class _Line(NamedTuple):
-    """A line of a map on which parameter ``number`` has a value, at a share of its range."""
+    """A line on which parameter ``number`` has a value, and the ends of the other parameter."""
 
     number: int
     value: float
-    share: float
-    result: Result
+    low: float
+    high: float
 
 
 class _Begun(NamedTuple):
@@ -246,12 +268,18 @@ class _BoundarySearch:
         # One scale for all boundaries: that of one motion would be too small along the curve.
         self.scale = coordinate_scale(moving[np.newaxis])[0]
 
-    def axes_of_lines(self) -> list[int]:
-        """Return the parameters that lines are drawn at: all, or those on which maps depend.
+    def lines(self, count: int) -> list[tuple[int, float]]:
+        """Return the lines across the map: the parameter that each has one value of, and its share.
 
-        Flow maps are made anew at every value of such a parameter.
+        ``count``: number of lines in each direction. Along a parameter on which flow maps depend,
+        they are made anew at every value, so that one line in the middle has to do.
         """
-        return [*range(PARAMETERS)] if self.fixed < 0 else [self.fixed]
+        counts = [count if self.fixed in (one, -1) else min(count, 1) for one in range(PARAMETERS)]
+        return [
+            (one, (at + 0.5) / counts[one])
+            for one in range(PARAMETERS)
+            for at in range(counts[one])
+        ]
 
     def along_lines(self, result: Result, places: Sequence[tuple[int, float]]) -> int:
         """Trace the branches along lines, and follow boundaries from them and from changes.
@@ -260,48 +288,65 @@ class _BoundarySearch:
         range. Returns the number of branches.
         """
         branches = [*self._branches(result, places)]
-        specials = [
+        self._follow_with_changes(self._from_branches(branches))
+        return len(branches)
+
+    def _from_branches(
+        self, branches: Sequence[tuple["_Line", TracedBranch]]
+    ) -> list[Following["_Begun"]]:
+        """Return the searches of boundaries at the special points of branches along lines."""
+        return [
             self._from_special(branch, special, line)
             for line, branch in branches
             for special in branch.specials
             if special.kind != BRANCH_POINT
         ]
-        self._follow_with_changes(specials)
-        return len(branches)
 
     def _branches(
         self, result: Result, places: Sequence[tuple[int, float]]
     ) -> Iterator[tuple["_Line", TracedBranch]]:
         """Trace the branches along lines side by side, and yield each with its line."""
-        lines, searches = self._lines(result, places), list[tuple[BranchSearch, Finding[None]]]()
-        for number, line in enumerate(lines):
+        lines, of_lines = self._lines(result, places)
+        searches = list[tuple[BranchSearch, Finding[None]]]()
+        for number, (line, of_line) in enumerate(zip(lines, of_lines, strict=True)):
             over = self.over.line(line, number, lines)
             search = BranchSearch(over, self.run, self.longest, APPROXIMATE, self.scale)
             across = known.axis_name(self.over.parameters[1 - line.number])
-            searches.append((search, search.following(search.motions(line.result, across))))
-        # Curves that advance side by side have the same number of steps.
-        steps = [one.over.steps_of_maps(self.run.plan) for one, _ in searches]
-        for count in sorted({*steps}):
-            same = [one for (_, one), of in zip(searches, steps, strict=True) if of == count]
-            run(together(same), defects_of)
+            searches.append((search, search.following(search.motions(of_line, across))))
+        self._traced_together([(search.over, one) for search, one in searches])
         for line, (search, _) in zip(lines, searches, strict=True):
             axis = known.axis_name(self.over.parameters[line.number])
             say(f"{axis} = {line.value:.6g}: {len(search.found)} branches")
             for branch in search.found:
                 yield line, branch
 
-    def _lines(self, result: Result, places: Sequence[tuple[int, float]]) -> list["_Line"]:
-        """Return the lines of a map that are nearest to some places; see `along_lines`."""
-        found = []
+    def _traced_together(self, searches: list[tuple[BranchRange, Finding[Found]]]) -> list[Found]:
+        """Return the results of searches along lines; those with equal steps share calls."""
+        steps = [over.steps_of_maps(self.run.plan) for over, _ in searches]
+        found: dict[int, Found] = {}
+        for count in sorted({*steps}):
+            same = [at for at, of in enumerate(steps) if of == count]
+            results = run(together([searches[at][1] for at in same]), defects_of)
+            found.update(zip(same, results, strict=True))
+        return [found[at] for at in range(len(searches))]
+
+    def _lines(
+        self, result: Result, places: Sequence[tuple[int, float]]
+    ) -> tuple[list["_Line"], list[Result]]:
+        """Return the lines of a map that are nearest to some places, and what it has on them.
+
+        ``places``: see `along_lines`.
+        """
+        lines, of_lines = [], []
         for number, share in places:
             axis = known.axis_name(self.over.parameters[number])
             wanted = float(self.over.values(np.full(PARAMETERS, share))[number])
-            of_map = result.sel("nearest", **{axis: wanted})
+            of_line = result.sel("nearest", **{axis: wanted})
+            ends = (float(of[1 - number]) for of in (self.over.low, self.over.high))
             # Where branches are traced, the line has exactly the value of its lanes.
-            value = of_map.fixed[axis]
-            ends = self.over.low[number], self.over.high[number]
-            found.append(_Line(number, value, (value - ends[0]) / (ends[1] - ends[0]), of_map))
-        return found
+            lines.append(_Line(number, of_line.fixed[axis], *ends))
+            of_lines.append(of_line)
+        return lines, of_lines
 
     def begin_with_changes(self, result: Result) -> None:
         """Find the changes of the motion between neighbouring cells of a map."""
@@ -325,13 +370,31 @@ class _BoundarySearch:
         """Follow boundaries through some points, and from changes that are beside none."""
         before, left = len(self.found), self.left
         chosen = left.spread(self.fixed) if left.flank.size else np.zeros(0, dtype=np.intp)
-        self._follow([*searches, *self._from_changes(left.of(chosen))])
+        jumps = left.flank[chosen] == JUMP
+        jumping, changing = left.of(chosen[jumps]), left.of(chosen[~jumps])
+        self._follow(
+            [*searches, *self._from_branches(self._across(jumping)), *self._from_changes(changing)]
+        )
         open_still = np.ones(left.flank.size, dtype=bool)
         open_still[chosen] = False
         for one in self.found[before:]:
-            same = (left.flank == one.equations.flank) & (left.period == one.period)
-            open_still &= ~(same & left.beside(one.shares))
+            same = left.flank == one.equations.flank
+            if one.equations.kind != GRAZING:
+                same |= left.flank == JUMP
+            open_still &= ~(same & (left.period == one.period) & left.beside(one.shares))
         self.left = left.of(open_still)
+
+    def _across(self, jumps: Changes) -> list[tuple["_Line", TracedBranch]]:
+        """Trace the branch of each motion that jumps, across its cell and the next ones."""
+        changes = [*jumps.each()]
+        lines, searches = [self.over.across(one) for one in changes], []
+        for number, (line, one) in enumerate(zip(lines, changes, strict=True)):
+            over = self.over.line(line, number, lines)
+            curve = over.curve(self.run.plan, one.period, self.scale)
+            guess = np.append(one.state / self.scale, self.over.along(line, one.shares))
+            searches.append((over, _through(curve, guess)))
+        traced = self._traced_together(searches)
+        return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
 
     def _from_changes(self, changes: Changes) -> list[Following["_Begun"]]:
         """Return the searches of boundaries next to changes of a map."""
@@ -370,8 +433,7 @@ class _BoundarySearch:
     ) -> Following["_Begun"]:
         """Search the point of a boundary at a special point of a branch."""
         equations = self._equations(branch.period, special.kind, special.flank)
-        shares = np.full(PARAMETERS, special.point.share)
-        shares[line.number] = line.share
+        shares = self.over.shares(line, special.point.share)
         guess = np.concatenate([special.point.place[:-1], shares])
         start = yield from equations.beginning(guess, self._along(line.number))
         return _Begun(equations, start, guess, special.point)
@@ -518,6 +580,14 @@ class _BoundarySearch:
             float(boundary.positions[located.number]),
             located.point.multipliers,
         )
+
+
+def _through(curve: Curve, guess: Floats) -> Finding[TracedBranch | None]:
+    """Search the branch through a motion, if its orbit is found."""
+    start = yield from curve.correcting(guess, along_the_way(guess.size - 1))
+    if start is None or not 0.0 <= start.share <= 1.0:
+        return None
+    return (yield from tracing_branch(curve, start, located=APPROXIMATE))
 
 
 def _kinds(change: MapChange, values: Complex) -> list[str]:

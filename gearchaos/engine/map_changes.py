@@ -7,7 +7,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from gearchaos.arrays import Floats, Integers, Mask
+from gearchaos.results.reading.jumps import jump_sizes, sections_of, size_of
 from gearchaos.results.reading.result import Result
+
+JUMP = -2
+"""In place of a flank: the motion jumps to another one of the same period."""
 
 PARTS = 8
 """Parts of each range; in each part of the map, one change of every kind is a start at a time."""
@@ -19,13 +23,15 @@ class MapChange(NamedTuple):
     Attributes
     ----------
     flank : int
-        Number of the flank whose impacts change, -1 if the period changes.
+        Number of the flank whose impacts change, -1 if the period changes, or `JUMP`.
     period : int
         Its period in excitation periods.
     state : array, shape (states,)
         Its state at the end of the record, dimensionless.
     shares : array, shape (2,)
         Where the cell lies in the ranges of both parameters.
+    other : array, shape (2,)
+        The same of the cell next to it.
     number : int
         The parameter that both cells have in common.
     """
@@ -34,6 +40,7 @@ class MapChange(NamedTuple):
     period: int
     state: Floats
     shares: Floats
+    other: Floats
     number: int
 
 
@@ -53,7 +60,7 @@ class Changes(NamedTuple):
         and the second parameter.
     counts : array of int, shape (2,)
         Number of cells along the first and the second parameter.
-    shares : array, shape (changes, 2)
+    shares, other : array, shape (changes, 2)
         As in `MapChange`.
     """
 
@@ -65,6 +72,7 @@ class Changes(NamedTuple):
     cells: Integers
     counts: Integers
     shares: Floats
+    other: Floats
 
     def of(self, chosen: Mask | Integers) -> Self:
         """Return some of the changes."""
@@ -76,6 +84,7 @@ class Changes(NamedTuple):
             growth=self.growth[chosen],
             cells=self.cells[chosen],
             shares=self.shares[chosen],
+            other=self.other[chosen],
         )
 
     def beside(self, curve: Floats) -> Mask:
@@ -115,6 +124,7 @@ class Changes(NamedTuple):
                 int(self.period[at]),
                 self.state[at],
                 self.shares[at],
+                self.other[at],
                 int(self.number[at]),
             )
 
@@ -141,19 +151,26 @@ def changes_of(
     period = result.lanes("period").reshape(*shape, -1).astype(np.intp)
     counts = [result.lanes(name).reshape(period.shape) * period for name in impacts]
     periodic = (period > 0) & (period <= longest)
+    sections = _sections(result)
+    sections = sections.reshape(*period.shape, *sections.shape[1:])
     found = []
     for number in (0, 1):
         one, other = _neighbours(number)
         differs = period[one] != period[other]
         found.append(_rows(-1, number, differs, periodic))
+        found.append(_rows(JUMP, number, _jumps(number, period, sections), periodic))
         for flank, count in enumerate(counts):
             more = np.abs(count[one] - count[other]) > 0.5
             found.append(_rows(flank, number, more & ~differs, periodic))
     rows, growth = np.concatenate(found), np.zeros(period.size)
     if "lyapunov_exponent" in result.variables:
         growth = result.lanes("lyapunov_exponent")
-    lanes = np.ravel_multi_index(tuple(rows[:, [3, 2, 6]].T), period.shape)
-    place = np.stack([result.along(axis) for axis in axes], axis=-1)[lanes]
+    place = np.stack([result.along(axis) for axis in axes], axis=-1)
+    place = (place - ends[0]) / (ends[1] - ends[0])
+    lanes, beside = (
+        np.ravel_multi_index(tuple(rows[:, [second, first, 6]].T), period.shape)
+        for first, second in ((2, 3), (4, 5))
+    )
     return Changes(
         rows[:, 0],
         period.reshape(-1)[lanes],
@@ -162,8 +179,33 @@ def changes_of(
         growth[lanes],
         rows[:, 2:6].reshape(-1, 2, 2),
         np.array(shape[::-1], dtype=np.intp),
-        (place - ends[0]) / (ends[1] - ends[0]),
+        place[lanes],
+        place[beside],
     )
+
+
+def _sections(result: Result) -> Floats:
+    """Return the sections (lanes, points, states) relative to their sizes, or states of period 1.
+
+    The states at the ends of the records show jumps of period 1 only.
+    """
+    sections = sections_of(result)
+    if not sections.size:
+        sections = result.lanes("end_state")[:, np.newaxis]
+    return np.asarray(sections / size_of(sections))
+
+
+def _jumps(axis: int, period: Integers, sections: Floats) -> Mask:
+    """Return between which cells that are neighbours along an axis motions of one period jump.
+
+    ``period`` has the shape of the map, ``sections`` that shape and then points and states.
+    """
+    along, points = np.moveaxis(period, axis, 0), np.moveaxis(sections, axis, 0)
+    found = np.zeros((along.shape[0] - 1, *along.shape[1:]), dtype=bool)
+    for line in np.ndindex(along.shape[1:]):
+        at = (slice(None), *line)
+        found[at] = jump_sizes(along[at], points[at], alone=0.0) > 0.0
+    return np.moveaxis(found, 0, axis)
 
 
 def _neighbours(number: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:

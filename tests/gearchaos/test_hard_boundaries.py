@@ -9,8 +9,8 @@ import pytest
 import gearchaos
 from gearchaos.dynamics import boundary_following, boundary_tests
 from gearchaos.engine.bounding import coarse_map, find_boundaries
-from gearchaos.records.boundary import CORNER, GRAZING_FOLD, STRONG_RESONANCE_11
-from gearchaos.records.branch import FOLD, GRAZING, LOST, NEIMARK_SACKER
+from gearchaos.records.boundary import CORNER, GRAZING_FLIP, GRAZING_FOLD, STRONG_RESONANCE_11
+from gearchaos.records.branch import EDGE, FOLD, GRAZING, LOST, NEIMARK_SACKER, PERIOD_DOUBLING
 
 MAP = Path(__file__).parents[2] / "sweeps" / "speed_and_error.toml"
 
@@ -52,7 +52,7 @@ def resonances(kind):
 
 
 def test_every_curve_ends_for_a_reason():
-    assert len(boundaries()) == 14
+    assert len(boundaries()) == 15
     assert not any(LOST in one.ends for one in boundaries())
 
 
@@ -95,10 +95,17 @@ def test_a_resonance_next_to_a_third_multiplier_is_located():
     assert point.multipliers[2] == pytest.approx(0.995735, abs=1e-4)
 
 
-def test_a_fold_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
-    (curve,) = [one for one in curves(FOLD) if CORNER in one.ends]
+def test_a_curve_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
+    (curve,) = [one for one in curves(PERIOD_DOUBLING) if CORNER in one.ends]
     end = curve.values[0 if curve.ends[0] == CORNER else -1]
-    meetings = [places(one, GRAZING_FOLD) for one in curves(GRAZING)]
+    meetings = [places(one, GRAZING_FLIP) for one in curves(GRAZING)]
     away = np.abs(np.concatenate(meetings) - end).max(axis=1)
     # The end is where no step of 1e-7 leads further, beside the square root of a grazing.
     assert away.min() < 2e-6
+
+
+def test_a_fold_goes_on_behind_a_grazing_where_it_is_started_on_both_sides():
+    (meeting,) = np.concatenate([places(one, GRAZING_FOLD) for one in curves(GRAZING)])
+    (curve,) = [one for one in curves(FOLD) if one.values[:, 0].min() < meeting[0]]
+    assert curve.ends == (EDGE, EDGE)
+    assert np.abs(curve.values - meeting).max(axis=1).min() < 2e-3

@@ -118,16 +118,16 @@ def jumps(result: Result) -> list[Jump]:
 
 
 def sections_of(result: Result) -> Floats:
-    """Return all sections along one axis, one point per excitation period.
+    """Return the sections of all lanes, one point per excitation period.
 
     Shape (lanes, points, states); without a section there are no points and no states.
     """
     names = section_variables(result)
     if not names:
-        return np.zeros((result[result.axis].size, 0, 0))
+        return np.zeros((result.lanes("period").size, 0, 0))
     # Neighbouring lanes may differ by whole excitation periods along their orbit, not by parts.
     every = excitation_of(result.metadata).excitation_period
-    return np.stack([result[name][:, ::-every][:, ::-1] for name in names], axis=2)
+    return np.stack([result.lanes(name)[:, ::-every][:, ::-1] for name in names], axis=2)
 
 
 def size_of(sections: Floats) -> Floats:
