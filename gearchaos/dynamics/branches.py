@@ -25,7 +25,16 @@ from gearchaos.dynamics.arclength import (
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
-from gearchaos.records.branch import CLOSED_CURVE, EDGE, HALVING, IN_ERRORS, LOST, TOO_MANY
+from gearchaos.records.branch import (
+    BRANCH_POINT,
+    CLOSED_CURVE,
+    EDGE,
+    FOLD,
+    HALVING,
+    IN_ERRORS,
+    LOST,
+    TOO_MANY,
+)
 
 LONGEST = 0.1
 """Longest step along a branch."""
@@ -247,6 +256,12 @@ def _with_specials(
     located_between = yield from together(
         [specials_between(curve, one, other, located) for one, other in pairwise(points)]
     )
+    if not curve.exact and located_between:
+        # Next to the orbit of half the period, errors of the method look like folds.
+        for at in (end for end, reason in zip((0, -1), ends, strict=True) if reason == HALVING):
+            located_between[at] = [
+                one for one in located_between[at] if one[0] not in (FOLD, BRANCH_POINT)
+            ]
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
     for (one, other), between in zip(pairwise(points), located_between, strict=True):

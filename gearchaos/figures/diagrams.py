@@ -9,6 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.errors import FigureError
@@ -38,6 +39,9 @@ from gearchaos.outputs.names import (
     STATUS,
 )
 from gearchaos.results.reading.result import Result, section_variables
+
+HATCH = "////"
+"""Hatching under a positive exponent."""
 
 BAND_STANDARD_ERRORS = 2.0
 TWO_ERRORS = "\N{PLUS-MINUS SIGN}2 standard errors"
@@ -224,8 +228,7 @@ def lyapunov(
     named: list[Artist] = [parts["band"]] if (shown.spread[shown.finite] > 0.0).any() else []
     named += _circle_mixed(axes, result, shown)
     if (shown.values[shown.finite & ~shown.isolated] > 0.0).any():
-        parts["positive"].set_label("positive exponent")
-        named.append(parts["positive"])
+        named.append(Patch(fc="none", ec=GREY, lw=0.4, hatch=HATCH, label="positive exponent"))
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     reach = np.nan_to_num(shown.spread)
     own = Diagram(line, shown.lanes, shown.values, shown.values, reach, named, parts)
@@ -283,7 +286,7 @@ def _draw_exponents(
     joined = np.where(alone, np.nan, exponent)
     zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
     # Colours are left to the stages behind: hatching and uncertainty are grey.
-    fill: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
+    fill: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": HATCH}
     positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **fill)
     pale = _pale(color)
     fill = {"color": pale, "lw": 0.0, "label": TWO_ERRORS}

@@ -19,7 +19,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, check_variable, in_words, legend_title
 from gearchaos.figures.lanes import Between, cell_edges, map_axes, select_lanes
 from gearchaos.figures.page import Page, few_ticks, footnote, page
-from gearchaos.figures.panel import robust_limits
+from gearchaos.figures.panel import legend_entries, robust_limits
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, STATUS
@@ -217,8 +217,8 @@ def map_page(
             axes.label_outer()
             _mark_lines(axes, result, marked or {})
         if marked:
-            before, lines = panels[0].get_legend(), panels[0].get_legend_handles_labels()[0]
-            _legend(panels[0], [*(before.legend_handles if before else ()), *lines])
+            lines = panels[0].get_legend_handles_labels()[0]
+            _legend(panels[0], [*legend_entries(panels[0]), *lines])
         _set_titles(panels, [_name(result, name, 34 if beside else 80) for name in names], beside)
         footnote(figure, legend_title(result) or "")
         if result.fixed:

@@ -159,8 +159,18 @@ def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> 
     """
     look: dict[str, Any] = {"marker": "|", "ms": 8.0, "mew": 0.9, "color": VERMILION}
     ticks = [_marks(axes, np.asarray(values), 1.0, label, **look) for axes in panels]
-    before = panels[0].get_legend()
-    legend_above(panels[0], [ticks[0], *(before.legend_handles if before else ())])
+    legend_above(panels[0], [ticks[0], *legend_entries(panels[0])])
+
+
+def legend_entries(axes: Axes) -> list[Artist]:
+    """Return the entries of the legend of axes with their names, which patches in it have lost."""
+    legend = axes.get_legend()
+    if legend is None:
+        return []
+    entries: list[Artist] = [one for one in legend.legend_handles if one is not None]
+    for entry, text in zip(entries, legend.get_texts(), strict=True):
+        entry.set_label(text.get_text())
+    return entries
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:

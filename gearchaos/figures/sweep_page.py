@@ -13,7 +13,7 @@ from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall
 from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
-from gearchaos.figures.panel import legend_above, mark_values
+from gearchaos.figures.panel import legend_above, legend_entries, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
 from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, ORDER, WAYS
@@ -233,6 +233,5 @@ def _mark_stretches(panels: Sequence[Axes], result: Result) -> None:
     if ends:
         mark_values(panels, "jumps", ends)
     if shades:
-        before = panels[0].get_legend()
-        named = [*(before.legend_handles if before else ()), shades[0]]
+        named = [*legend_entries(panels[0]), shades[0]]
         legend_above(panels[0], sorted(named, key=lambda one: one.get_label() == "jumps"))

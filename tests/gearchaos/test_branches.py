@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.branching import find_branches
 from gearchaos.records.branch import (
     CLOSED_CURVE,
     EDGE,
@@ -214,6 +215,51 @@ def test_where_errors_hide_a_branch_its_end_says_so():
     system = gearchaos.System(config, frequency=0.7)
     branch = system.branch(system.orbit(), "frequency", 0.55, 0.8)
     assert branch.ends == (IN_ERRORS, IN_ERRORS)
+
+
+PUMP = """
+[pair]
+teeth = [17, 53]
+normal_module_mm = 3.0
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 12.0
+face_width_mm = 25.0
+profile_shift = [0.3, 0.0]
+
+[operation]
+torque_Nm = 60.0
+speed_rpm = 9000.0
+
+[mesh]
+mean_stiffness_N_per_um_mm = 14.0
+circumferential_backlash_um = 120.0
+damping_ratio = 0.05
+stiffness = { shape = "trapezoid" }
+
+[pitch_error]
+amplitude_um = 8.0
+
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+
+[sweep]
+parameter = "pitch_error.amplitude_um"
+from = 0.0
+to = 60.0
+count = 61
+
+[start]
+carry = "both"
+"""
+
+
+def test_a_doubled_branch_of_rk4_does_not_fold_where_it_begins():
+    found = find_branches(gearchaos.run(gearchaos.Configuration.from_toml(PUMP, "pump.toml")))
+    doubled = [one for one in found.branches if one.period == 2]
+    assert doubled
+    for branch in doubled:
+        begin = min(branch.value[0], branch.value[-1])
+        assert all(abs(one - begin) > 0.1 for one in of_kind(branch, FOLD))
 
 
 def test_stability_changes_at_special_points_only():

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
 from gearchaos.figures.labels import axis_label, in_words
+from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import HATCHES
 from gearchaos.figures.style import OVERLAID
 from gearchaos.plot import main
@@ -149,3 +151,11 @@ def test_of_several_files_the_map_is_the_one_that_is_refused(tmp_path, capsys):
         "both.h5: only diagrams of sweeps are drawn over each other, and here is a map"
         in capsys.readouterr().err
     )
+
+
+def test_marks_of_values_leave_the_names_of_patches_in_the_legend():
+    axes = Figure().subplots()
+    legend_above(axes, [Patch(label="directions differ")])
+    mark_values([axes], "jumps", [0.5])
+    named = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert named == ["jumps", "directions differ"]

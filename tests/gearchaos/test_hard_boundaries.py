@@ -100,8 +100,8 @@ def test_a_curve_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
     end = curve.values[0 if curve.ends[0] == CORNER else -1]
     meetings = [places(one, GRAZING_FLIP) for one in curves(GRAZING)]
     away = np.abs(np.concatenate(meetings) - end).max(axis=1)
-    # The end is where no step of 1e-7 leads further, beside the square root of a grazing.
-    assert away.min() < 2e-6
+    # Beside the square root of a grazing the last 40 points cover less than 0.001.
+    assert away.min() < 1e-4
 
 
 def test_a_fold_goes_on_behind_a_grazing_where_it_is_started_on_both_sides():

@@ -16,8 +16,12 @@ from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import labelled_lanes
 
-STEEPEST = 5.0
-"""At a jump, neighbouring lanes are farther apart than the lanes beside them by this factor."""
+STEEPEST, STEEPER = 5.0, 3.0
+"""Factors by which lanes at a jump are farther apart than the lanes on one side, and on both.
+
+Where a contact begins, a motion may change with the square root of the parameter: the first step is
+then up to 2.5 times as long as the next one, and any number of times as long as the one before.
+"""
 
 SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the sweep.
 BESIDE = 8  # Number of lanes on either side of a crisis that are compared.
@@ -163,10 +167,11 @@ def jump_sizes(
     enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
     apart = section_distance(section[:-1], section[1:], common)
-    # fmax: beside the end of a stage, only the other side can be compared.
+    # fmin and fmax: beside the end of a stage, only the other side can be compared.
     rate = np.pad(np.where(np.isnan(apart), alone, apart) / cells, 1, constant_values=alone)
-    beside = np.fmax(rate[:-2], rate[2:]) * cells
-    return np.where((apart > SMALLEST) & (apart > STEEPEST * beside), apart, 0.0)
+    one, both = (of(rate[:-2], rate[2:]) * cells for of in (np.fmin, np.fmax))
+    steep = (apart > STEEPEST * one) & (apart > STEEPER * both)
+    return np.where((apart > SMALLEST) & steep, apart, 0.0)
 
 
 def crises(result: Result) -> list[Crisis]:
