@@ -26,6 +26,7 @@ from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.controlling.controller import Controller
+    from gearchaos.models import Configuration
 
 
 class ControlOptions(NamedTuple):
@@ -121,15 +122,13 @@ def _controller(options: ControlOptions) -> "Controller":
     from gearchaos.system import System
 
     config = load_config(options.config)
-    swept = [sweep.parameter for sweep in config.sweeps.values()]
-    system = System(config, _values(options.at, swept))
+    values = _values(options.at, config)
+    system = System(config, values)
     orbits = system.orbits(options.period)
     if options.orbit >= len(orbits):
-        raise ConfigurationError(
-            f"{options.config}: {len(orbits)} orbits of period {options.period} were found near "
-            f"the motion, and --orbit {options.orbit} is not among them; choose another --period "
-            "or --orbit"
-        )
+        raise ConfigurationError(f"{options.config}: {_missing(options, len(orbits))}")
+    if orbits[options.orbit].stable:
+        say("this orbit is stable: the motion stays on it without control")
     settings = ControlSettings(
         method=options.method,
         input_weight=options.input_weight,
@@ -143,14 +142,49 @@ def _controller(options: ControlOptions) -> "Controller":
     return Controller(system, orbits[options.orbit], settings)
 
 
-def _values(places: tuple[Place, ...], swept: list[str]) -> dict[str, float]:
-    """Return the value of each parameter; one without a name belongs to the only swept one."""
+def _missing(options: ControlOptions, found: int) -> str:
+    """Return why an orbit was not found; ``found``: the number of those of its period."""
+    if not found:
+        return (
+            f"no orbit of period {options.period} was found near the motion; choose another "
+            "--period or another value with --at (chaos in several bands comes near orbits of "
+            "multiples of their number only)"
+        )
+    return (
+        f"{found} orbits of period {options.period} were found near the motion, and --orbit "
+        f"{options.orbit} is not among them; choose one below {found}, or another --period"
+    )
+
+
+def _values(places: tuple[Place, ...], config: "Configuration") -> dict[str, float]:
+    """Return the value of each swept parameter; one without a name belongs to the only one.
+
+    A name may be that of a parameter, or that of its axis in results.
+    """
+    from gearchaos.models import swept_values
+    from gearchaos.outputs.names import axis_name
+
+    swept = {one.parameter: swept_values(one) for one in config.sweeps.values()}
     unnamed = [place for place in places if not place.axis]
     if unnamed and len(swept) != 1:
         raise ConfigurationError(
             f"--at {unnamed[0].value:g}: several parameters are swept; write NAME=VALUE"
         )
-    return {place.axis or swept[0]: place.value for place in places}
+    of_axes = {axis_name(one): one for one in swept}
+    values = {
+        of_axes.get(place.axis, place.axis) or next(iter(swept)): place.value for place in places
+    }
+    for parameter, among in swept.items():
+        low, high = float(among.min()), float(among.max())
+        if parameter not in values and low < high:
+            option = "--at VALUE" if len(swept) == 1 else f"--at {parameter}=VALUE"
+            raise ConfigurationError(
+                f"{config.source}: {parameter} is swept from {low:g} to {high:g}, and control "
+                f"needs one value of it: give {option}"
+            )
+        if not low <= values.get(parameter, low) <= high:
+            say(f"{parameter} = {values[parameter]:g} lies outside the sweep, {low:g} to {high:g}")
+    return values
 
 
 MEASURES = {
@@ -164,11 +198,14 @@ OF_ELEMENTS = ("time_apart", "force_largest", "gap_peak_to_peak")
 
 def table(facts: dict[str, Any], periods: str) -> list[str]:
     """Return what a trial found as lines of text; ``periods``: the word for its periods."""
-    lines = [f"orbit of period {facts['period']}", "  multipliers      with control     input acts"]
+    lines = [
+        f"orbit of period {facts['period']}",
+        f"  {'multipliers':20} {'with control':20} input acts",
+    ]
     rows = zip(
         facts["multipliers"], facts["closed_multipliers"], facts["input_shares"], strict=True
     )
-    lines += [f"  {_number(a):16} {_number(b):16} {share:.1e}" for a, b, share in rows]
+    lines += [f"  {_number(a):20} {_number(b):20} {share:.1e}" for a, b, share in rows]
     lines += [
         f"captured: {facts['captured']} of {facts['starts']} starts, "
         f"{_percent(facts['captured_share'])} ({_percent(facts['captured_low'])} to "

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     """One page: the end of its name, after that of the result, and the function that draws it."""
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
-OTHER_PICTURES = ("avif", "gif")  # Endings that matplotlib supports from version 3.11.
+OTHER_PICTURES = ("avif", "bmp", "gif")  # Endings that not every version of matplotlib supports.
 
 
 class PlotOptions(NamedTuple):
@@ -371,7 +371,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     from gearchaos.figures.style import SINGLE_COLUMN_MM
 
     name = _detail(results[0], options)
-    marked = _marked(options, swept_axes(results[0]))
+    marked = _marked(options, results[0], swept_axes(results[0]))
     width, height = options.width or SINGLE_COLUMN_MM, options.height
     between = (options.low, options.high)
     for chosen, kind, draw_page in (
@@ -416,14 +416,18 @@ def _detail(result: "Result", options: PlotOptions) -> str:
     return name
 
 
-def _marked(options: PlotOptions, swept: Sequence[str]) -> dict[str, float]:
-    """Return the value of --mark for each axis; raise a FigureError if an axis is not swept."""
+def _marked(options: PlotOptions, result: "Result", swept: Sequence[str]) -> dict[str, float]:
+    """Return the value of --mark for each axis; a FigureError if it lies on no axis."""
     marked = placed_coordinates(options.mark, swept, option="--mark")
     if unknown := [axis for axis in marked if axis not in swept]:
         raise FigureError(
             f"--mark {unknown[0]}: is no swept parameter of the figure, which are "
             f"{', '.join(swept)}"
         )
+    for axis, value in marked.items():
+        low, high = float(result[axis].min()), float(result[axis].max())
+        if not low <= value <= high:
+            raise FigureError(f"--mark {value:g}: {axis} runs from {low:g} to {high:g}")
     return marked
 
 

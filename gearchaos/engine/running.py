@@ -29,7 +29,7 @@ from gearchaos.outputs.variable import Variable, require_listed
 from gearchaos.progress import say, speaking
 from gearchaos.results.reading.result import Result
 
-COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
+COMPILING = "preparing the kernel of this scene, once; this may take up to a minute"
 """Message before a kernel is compiled."""
 
 

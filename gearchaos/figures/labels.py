@@ -14,6 +14,14 @@ from gearchaos.outputs.variable import Variable
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
 
+CLOSE = 0.8
+"""Least similarity of a name to one that may have been meant."""
+
+SWITCHED_OFF = (
+    "others have to be switched on in [outputs] of the configuration, such as loads = true, before "
+    "a run"
+)
+
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     """Compose the label of a variable: its long name, symbol and unit, broken into lines.
@@ -115,9 +123,10 @@ def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
 def check_variable(variable: str, there: Sequence[str], where: str) -> None:
     """Raise FigureError unless the variable is in ``there``; the message lists the others."""
     if variable not in there:
-        hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
+        near = get_close_matches(variable, there, 1, cutoff=CLOSE)
+        hint = "".join(f"did you mean {one}?" for one in near) or SWITCHED_OFF
         rule = f"no variable {variable!r} {where} in the result"
-        raise FigureError(f"{rule}; it has {', '.join(there) or 'none'}{hint}")
+        raise FigureError(f"{rule}; it has {', '.join(there) or 'none'}; {hint}")
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:

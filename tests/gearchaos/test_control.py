@@ -16,7 +16,7 @@ from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controll
 from gearchaos.dynamics.controllers import ControlSettings
 from gearchaos.errors import ConfigurationError
 
-from .commands import run_module
+from .commands import SMALL, run_module
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 PUBLISHED = {0.05: (0.915, 347), 0.1: (1.0, 164), 0.2: (1.0, 144), 0.3: (1.0, 140)}
@@ -200,3 +200,20 @@ def test_the_command_names_an_orbit_that_is_not_there(tmp_path):
     assert done.code == 2
     assert "--orbit 7 is not among them" in done.err
     assert "Traceback" not in done.err
+
+
+def test_the_command_asks_for_a_value_and_takes_the_name_of_an_axis(tmp_path):
+    configuration = str(SWEEPS / "pan2021.toml")
+    done = run_module("gearchaos.control", configuration, cwd=tmp_path)
+    assert done.code == 2
+    assert "pitch_error is swept from 0 to 15" in done.err
+    assert "give --at VALUE" in done.err
+    text = SMALL.replace('parameter = "pitch_error"', 'parameter = "operation.torque_Nm"')
+    (tmp_path / "torque.toml").write_text(
+        text.replace("from = 0.0\nto = 5.0", "from = 5.0\nto = 9.0")
+    )
+    options = ("torque.toml", "--at", "operation_torque_Nm=50", "--starts", "5", "--periods", "20")
+    done = run_module("gearchaos.control", *options, cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert "operation.torque_Nm = 50 lies outside the sweep, 5 to " in done.err
+    assert "this orbit is stable" in done.err

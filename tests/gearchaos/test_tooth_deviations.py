@@ -499,3 +499,10 @@ def test_what_was_understood_is_a_note_before_the_sweep():
     assert driving_note.startswith("driving gear: 21 teeth of inspection.csv, column driving")
     assert driving_note.endswith("single deviation 10.5 um: grade 7 of ISO 1328-1:1995")
     assert driven_note.endswith("grade 7 of ISO 1328-1:1995") and "38 teeth" in driven_note
+
+
+def test_deviations_in_millimetres_are_noticed():
+    given = ", ".join(f"{f / 1000.0}" for f in F)
+    text = driving(f"cumulative_um = [{given}]").replace("steps_per_period = 40\n", "")
+    config = Configuration.from_toml(text, "mm.toml")
+    assert any("probably given in mm" in note for note in plan_run(config).notes)

@@ -24,6 +24,11 @@ MOST_DISCS = 20.0
 OF_DISCS = {"masses_kg": "kg", "inertias_kg_m2": "kg m^2"}
 """Keys of [pair] that replace a quantity of solid discs, and their units."""
 
+FINEST_UM = 0.1
+"""Largest single deviation, in um, below that of every gear that can be made."""
+
+IN_MM = "; no gear is as fine, so they were probably given in mm: multiply them by 1000"
+
 
 def remarks(
     config: GearPairTables, system: GearPairs, parameters: Mapping[str, Floats]
@@ -61,6 +66,7 @@ def _inspected(config: GearPairTables) -> Iterator[str]:
         yield (
             f"{name} gear: {teeth} teeth{source}, {holds} deviations; their range is "
             f"{spread:.4g} um and the largest single deviation {single:.4g} um: {grade}"
+            f"{IN_MM if 0.0 < single < FINEST_UM else ''}"
         )
 
 
