@@ -102,11 +102,16 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
     if outcome.status[0] == kernels.Status.OK:
         section = outcome.every(repeats).section[0]
         found = embedded_orbits(system, section, control.period, plan).points
+    if not len(found):
+        raise ConfigurationError(
+            f"{run.config.source}: no orbit of period {control.period} was found near the motion"
+            f"{wanted.place}; choose another control.period or control.found_at"
+        )
     if control.number >= len(found):
         raise ConfigurationError(
             f"{run.config.source}: control.number = {control.number}: {len(found)} orbits of "
-            f"period {control.period} were found near the motion{wanted.place}; choose another "
-            "control.period, control.number or control.found_at"
+            f"period {control.period} were found near the motion{wanted.place}; choose a smaller "
+            "control.number, or another control.period or control.found_at"
         )
     point: Floats = found[control.number]
     return point

@@ -422,6 +422,13 @@ def test_branches_are_not_drawn_into_the_chart_of_exponents(files):
     assert not (folder / "bare.png").exists()
 
 
+def test_other_commands_name_what_the_file_holds(files):
+    for command in ("info", "stages"):
+        done = run(command, "sweep_branches.h5", cwd=files[0])
+        assert done.code == 4
+        assert "holds branches, and is no result of a sweep" in done.err
+
+
 def test_a_damaged_file_is_refused(files):
     folder, _ = files
     whole = bytearray((folder / "sweep_branches.h5").read_bytes())

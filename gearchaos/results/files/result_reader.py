@@ -26,6 +26,9 @@ Contents = tuple[
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
+OTHER_CONTENTS = ("branches", "boundaries")
+"""Contents of other files of this program, which the schema of each names."""
+
 SOON_HASHED = 1 << 30  # Bytes; their checksum takes about a second.
 
 LONGEST_SYMBOL = 60
@@ -183,6 +186,12 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     schema, version = metadata.get("schema"), str(metadata.get("schema_version", ""))
     own = SCHEMA_VERSION.split(".")[0]
+    content = str(schema).removeprefix("gearchaos-")
+    if content in OTHER_CONTENTS:
+        raise UnfitError(
+            f"holds {content}, and is no result of a sweep",
+            "gearchaos plot and gearchaos report read it; give here the sweep that it belongs to",
+        )
     if schema != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
