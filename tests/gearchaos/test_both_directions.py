@@ -12,6 +12,7 @@ from gearchaos.engine.recomputing import computable
 from gearchaos.engine.refinement import refined_jumps
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.outputs.names import WAYS
+from gearchaos.records.label import CHAOTIC
 from gearchaos.results.reading.jumps import apart
 
 from .commands import run_module, same_data
@@ -140,6 +141,14 @@ def test_a_table_names_the_direction_of_each_lane(result):
     assert table.index.get_level_values("direction").unique().tolist() == list(WAYS)
     assert table.loc[(2.0, "downwards"), "status"] == "ok"
     assert isinstance(table, pandas.DataFrame)
+
+
+def test_chaos_on_two_attractors_is_no_motion_of_one_label(folder):
+    result = gearchaos.open_result(folder / "both.h5")
+    result["motion"][:], result["period"][:] = CHAOTIC, 0
+    (stretch,) = apart(result)
+    assert (stretch.lower, stretch.upper) == pytest.approx((0.775, 1.675))
+    assert stretch.motion_upwards == stretch.motion_downwards == "chaotic"
 
 
 def test_the_diagram_overlays_the_directions_and_shades_where_they_differ(result):

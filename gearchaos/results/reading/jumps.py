@@ -278,13 +278,14 @@ def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
     -----
     Two motions differ if their labels differ, or if their sections are farther apart than
     `SMALLEST`; of motions of period 1, the end states are compared as well. Motions without a
-    period are the same if their labels are.
+    period also differ if the extents of their sections in some state have nothing in common.
     """
     ways = directions_of(result)
     if len(ways) == 1 or len(ways[0].axes) > 1:
         return []
     lanes = [labelled_lanes(one) for one in ways]
     differ = lanes[0].labels != lanes[1].labels
+    differ |= (lanes[0].period <= 0) & _separate(*map(sections_of, ways))
     period = np.where(differ, 0, lanes[0].period)
     # Branches may cross in the recorded states, but not in all; the end state is one point of it.
     ends = (one["end_state"][:, np.newaxis] for one in ways)
@@ -305,3 +306,11 @@ def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
         for first, after in np.flatnonzero(changes).reshape(-1, 2).tolist()
         if borders[after] - borders[first] >= narrowest
     ]
+
+
+def _separate(one: Floats, other: Floats) -> Mask:
+    """Return whether the extents of two sections have nothing in common in some state, (lanes,)."""
+    if not one.size:
+        return np.zeros(len(one), dtype=bool)
+    below = (one.max(axis=1) < other.min(axis=1)) | (other.max(axis=1) < one.min(axis=1))
+    return np.asarray(below.any(axis=1))
