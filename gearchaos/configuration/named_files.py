@@ -103,7 +103,7 @@ class CsvText:
         if name not in self.headings:
             asked = "column is missing" if name is None else f"has no column {shown(name)}"
             # Content is never quoted: the path may lead to any file of this machine.
-            raise ValueError(asked, "name a heading of its first line")
+            raise ValueError(asked, "name one of its headings; capitals count")
         if self.headings.count(str(name)) > 1:
             raise ValueError(f"has several columns {shown(name)}", "rename all but one of them")
         place = self.headings.index(str(name))

@@ -121,7 +121,7 @@ ROWS = [f"{n / 24!r},{300.0 + min(n, 24 - n)!r}" for n in range(24)]
         ([*ROWS, "1.0,390.0"], "", "begins with 300 and ends, a mesh period later, with 390"),
         ([*ROWS, "1.2,300.0"], "", "covers 1.2 mesh periods, must be at most 1; set `period`"),
         (ROWS, "fit_error = 1e-4, most_harmonics = 2,", "2 harmonics fit it to"),
-        (ROWS, "column = 'c',", 'has no column "c"; name a heading'),
+        (ROWS, "column = 'c',", 'has no column "c"; name one of its headings'),
         ([], "", "points; give at least 12"),
     ],
 )

@@ -194,8 +194,8 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
 
 ROWS = "Fp\n" + "".join(f"{f}\n" for f in F)
 FAULTY_FILES = {
-    "no column": ("p\n1\n", 'has no column "Fp"; name a heading of its first line'),
-    "nothing": ("# note\n", "name a heading of its first line"),
+    "no column": ("p\n1\n", 'has no column "Fp"; name one of its headings; capitals count'),
+    "nothing": ("# note\n", "name one of its headings; capitals count"),
     "text": (ROWS.replace("4.0", "four"), "line 3, column Fp: must be a finite number; give"),
     "nan": (ROWS.replace("4.0", "nan"), "line 3, column Fp: must be a finite number; give"),
     "inf": (
