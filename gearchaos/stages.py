@@ -45,7 +45,12 @@ class StagesOptions(NamedTuple):
     result: ResultFile
     refine: Annotated[
         float | None,
-        Option("bisect every boundary between two stages to this width", "WIDTH", low=1e-12),
+        Option(
+            "bisect every boundary between two stages to this width; of a sweep in both "
+            "directions, only the jumps, as closely as the orbits reach",
+            "WIDTH",
+            low=1e-12,
+        ),
     ] = None
     at: Annotated[
         tuple[Place, ...],

@@ -88,11 +88,15 @@ def refinable(result: Result, name: str) -> Configuration:
             f"{name}: nothing lies between two values of {config.sweep.parameter}; refine a sweep "
             "of another parameter"
         )
-    if start.carry != "none" or start.kind == "random" or start.drawn:
-        raise ConfigurationError(
-            f"{name}: nothing lies between lanes whose starts are carried on, random or drawn; "
-            "refine a sweep from another start"
-        )
+    carried = start.carry != "none"
+    if carried or start.kind == "random" or start.drawn:
+        rule = "nothing lies between lanes whose starts are carried on, random or drawn"
+        remedy = "sweep again with another [start]"
+        if carried:
+            remedy += (
+                ', such as carry = "none", or refine the jumps of both directions without --at'
+            )
+        raise ConfigurationError(f"{name}: {rule}; {remedy}")
     if start.kind == "grid":
         state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)
         config = config.replace("start", {"kind": "given", "state": dict(state)})
