@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_taken
+from gearchaos_kernels import METHODS, LaneSystem, Plan, gaps_along, integrate, steps_taken
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import ROUNDING
@@ -38,6 +38,12 @@ LAST = 1e-12
 
 NEARLY = 1e-7
 """Length of a Newton step after which a point may be accepted without another orbit."""
+
+BLURRED = 1e-8
+"""Length of Newton steps below which errors of a method may keep them from becoming shorter.
+
+Where RK4 begins to see a contact, its map jumps.
+"""
 
 NEAR_ENOUGH = 1e-3
 """Distance from a guess up to which its derivatives are used for the tangent."""
@@ -149,6 +155,7 @@ class Equations(NamedTuple):
         """
         place, last, where = guess, np.inf, guess
         slopes: Floats | None = None
+        exact = METHODS[self.plan.method].always_resolved
         # With the parameter of the flow maps fixed, derivatives take no further maps.
         moves = self.fixed < 0 or direction[self.fixed - PARAMETERS] ** 2 != 1.0
         for _ in range(STEPS):
@@ -158,8 +165,10 @@ class Equations(NamedTuple):
             length = float(np.linalg.norm(step))
             closed = max(CLOSED, ROUNDING * float(np.max(np.abs(passed.monodromy))))
             # In the second case the next step would be shorter than LAST.
-            if (length <= SHORT and float(np.max(np.abs(defect[:-1]))) <= closed) or (
-                length <= nearly and length**2 <= LAST * last
+            if (
+                (length <= SHORT and float(np.max(np.abs(defect[:-1]))) <= closed)
+                or (length <= nearly and length**2 <= LAST * last)
+                or (not exact and 0.9 * last <= length <= BLURRED)
             ):
                 place = place + step
                 if np.linalg.norm(place - where) > NEAR_ENOUGH:
