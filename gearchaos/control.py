@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.options import ConfigFile, Option, Overwrite, Place, Threads
+from gearchaos.options import ConfigFile, Option, Overwrite, Place, Threads, placed_coordinates
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
@@ -165,15 +165,9 @@ def _values(places: tuple[Place, ...], config: "Configuration") -> dict[str, flo
     from gearchaos.outputs.names import axis_name
 
     swept = {one.parameter: swept_values(one) for one in config.sweeps.values()}
-    unnamed = [place for place in places if not place.axis]
-    if unnamed and len(swept) != 1:
-        raise ConfigurationError(
-            f"--at {unnamed[0].value:g}: several parameters are swept; write NAME=VALUE"
-        )
-    of_axes = {axis_name(one): one for one in swept}
-    values = {
-        of_axes.get(place.axis, place.axis) or next(iter(swept)): place.value for place in places
-    }
+    names = {axis_name(one): one for one in (*(place.axis for place in places), *swept)}
+    placed = placed_coordinates(places, [axis_name(one) for one in swept])
+    values = {names[axis]: value for axis, value in placed.items()}
     for parameter, among in swept.items():
         low, high = float(among.min()), float(among.max())
         if parameter not in values and low < high:

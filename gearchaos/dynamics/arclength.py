@@ -55,6 +55,11 @@ of the steps is larger than the deviation from +1.
 """
 
 
+def is_exact(plan: Plan) -> bool:
+    """Whether the method of a plan has no errors but rounding."""
+    return METHODS[plan.method].always_resolved
+
+
 class CurvePoint(NamedTuple):
     """A point of a curve.
 
@@ -172,7 +177,7 @@ class Curve(NamedTuple):
     @property
     def exact(self) -> bool:
         """Whether orbits are exact up to rounding."""
-        return METHODS[self.plan.method].always_resolved
+        return is_exact(self.plan)
 
     def through(self, point: Floats, share: float) -> Self:
         """Return the curve with the scales of the orbit with state ``point`` at a share of it."""
@@ -377,13 +382,15 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
     return ahead + step**2 * square + step**3 * cube, tangents
 
 
-def stalls(places: Sequence[Floats], least: tuple[int, float]) -> bool:
-    """Whether the last places of a curve lead nowhere.
+def stalls(points: Sequence[OnCurve], least: tuple[int, float]) -> bool:
+    """Whether the last points of a curve lead nowhere.
 
-    ``least``: a number of successive places, and the distance that they cover at least.
+    ``least``: a number of successive points, and the distance that they cover at least.
     """
     many, distance = least
-    return len(places) >= many and bool(np.linalg.norm(places[-1] - places[-many]) < distance)
+    if len(points) < many:
+        return False
+    return bool(np.linalg.norm(points[-1].place - points[-many].place) < distance)
 
 
 def cubic(one: OnCurve, other: OnCurve, share: Floats) -> Floats:

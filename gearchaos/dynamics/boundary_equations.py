@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import METHODS, LaneSystem, Plan, gaps_along, integrate, steps_taken
+from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_taken
 
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.arclength import ROUNDING
+from gearchaos.dynamics.arclength import ROUNDING, is_exact
 from gearchaos.dynamics.boundary_passages import (
     PARAMETERS,
     Following,
@@ -155,7 +155,6 @@ class Equations(NamedTuple):
         """
         place, last, where = guess, np.inf, guess
         slopes: Floats | None = None
-        exact = METHODS[self.plan.method].always_resolved
         # With the parameter of the flow maps fixed, derivatives take no further maps.
         moves = self.fixed < 0 or direction[self.fixed - PARAMETERS] ** 2 != 1.0
         for _ in range(STEPS):
@@ -164,19 +163,20 @@ class Equations(NamedTuple):
             slopes, step, defect = passed.slopes, passed.step, passed.defect
             length = float(np.linalg.norm(step))
             closed = max(CLOSED, ROUNDING * float(np.max(np.abs(passed.monodromy))))
+            # The length is NaN where the motion diverged, or the equations are singular.
+            stalled = not length < 0.9 * last
             # In the second case the next step would be shorter than LAST.
             if (
                 (length <= SHORT and float(np.max(np.abs(defect[:-1]))) <= closed)
                 or (length <= nearly and length**2 <= LAST * last)
-                or (not exact and 0.9 * last <= length <= BLURRED)
+                or (stalled and length <= BLURRED and not is_exact(self.plan))
             ):
                 place = place + step
                 if np.linalg.norm(place - where) > NEAR_ENOUGH:
                     (there,) = yield [Passing(self, place, reference, direction)]
                     slopes = there.slopes
                 return self._point(place, slopes, direction, passed, reference)
-            # The length is NaN where the motion diverged, or the equations are singular.
-            if not length < 0.9 * last:
+            if stalled:
                 return None
             near = length < (CONTRACTION * last if moves else STRAIGHT)
             slopes = slopes if near or length < SHORT else None

@@ -138,7 +138,7 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
             step = min(longer, LONGEST)
             if half.end or half.met is not None:
                 return
-        if not half.end and stalls([one.place for one in points[-STALLED[0] :]], STALLED):
+        if not half.end and stalls(points, STALLED):
             half.end = _why_lost(equations, points[-1])
         elif len(points) == before:
             here, step = points[-1], step / 2.0

@@ -40,9 +40,9 @@ MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
 
 NEAR_ZERO = 0.5
-"""Largest ratio of the least value that a test function may have to the least one that it has.
+"""Largest ratio of the extreme of a parabola through three values to the one in the middle.
 
-Above it, no point is searched between two special points.
+Where the extreme is larger, there are no two special points to part.
 """
 
 MOST_PARTINGS = 8
@@ -54,13 +54,13 @@ def with_pairs_parted(curve: Curve, points: list[CurvePoint]) -> Finding[list[Cu
 
     A grazing has no test function with an amount, so pairs of them are not seen.
     """
-    values = np.array([[*_test_functions(one).values()] for one in points])
+    functions = [_test_functions(one) for one in points]
+    values = np.array([[*one.values()] for one in functions])
     places = np.array([one.place for one in points])
     positions = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    kinds = [*_test_functions(points[0])]
     sought = [
-        (at, kinds[column])
-        for column, of_kind in enumerate(values.T)
+        (at, kind)
+        for kind, of_kind in zip(functions[0], values.T, strict=True)
         for at in _nearly_zero(of_kind, positions)
     ]
     found = yield from together(

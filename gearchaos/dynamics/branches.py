@@ -58,7 +58,7 @@ The second is for methods with an error: where a multiplier is near +1, the smal
 derivatives turn the tangent by much.
 """
 
-JUMP = 1e-6
+LEAST_REACH = 1e-6
 """Distance from its prediction at which a point is accepted however short the step.
 
 Within `DIFFERENCE` of a grazing, the tangent of a curve of exact maps has large errors. Where the
@@ -316,7 +316,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             if len(points) > 2 and (yield from _meets(curve, here, last, start)):
                 return [*points, *further], CLOSED_CURVE
             points += further
-        if taken and stalls([one.place for one in points[-STALLED[0] :]], STALLED):
+        if taken and stalls(points, STALLED):
             return points, _end_of(curve, points[-1])
         if leaves and taken == len(trials):
             return points, EDGE
@@ -391,7 +391,7 @@ def _next(
     inside = (guesses[:, -1] >= 0.0) & (guesses[:, -1] <= 1.0)
     within = distances.size if inside.all() else int(np.argmin(inside))
     aside = ASIDE if curve.exact else ASIDE_BY_ERRORS
-    reaches = np.maximum(aside * np.diff(distances, prepend=0.0), JUMP)
+    reaches = np.maximum(aside * np.diff(distances, prepend=0.0), LEAST_REACH)
     searches = [
         curve.correcting(guess, direction, curve.plane(here.tangent, direction), reach=reach)
         for guess, direction, reach in zip(

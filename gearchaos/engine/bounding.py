@@ -5,15 +5,15 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
+from gearchaos_kernels import METHODS, Plan, steps_taken
 
-from gearchaos.arrays import Complex, Floats, Integers
+from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
 from gearchaos.dynamics.boundary_tests import Reference
-from gearchaos.dynamics.branch_range import BranchRange, only_map_parameter
+from gearchaos.dynamics.branch_range import only_map_parameter
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
@@ -21,6 +21,7 @@ from gearchaos.dynamics.side_by_side import Found, run, together
 from gearchaos.engine.branching import BranchSearch, flank_name
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.map_changes import JUMP, Changes, MapChange, changes_of
+from gearchaos.engine.map_lines import Line, Ranges
 from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
@@ -30,7 +31,6 @@ from gearchaos.engine.running import run as compute
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
-from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.progress import progress, say
@@ -114,7 +114,7 @@ def find_boundaries(
         raise ConfigurationError(
             f"{name}: nothing lies between two values of {whole[0]}; sweep another parameter"
         )
-    over = _Ranges.of(config)
+    over = Ranges.of(config)
     search = _BoundarySearch(
         over, plan_run(for_continuation(_small(config, PARAMETERS))), longest, result
     )
@@ -160,85 +160,6 @@ def _small(config: Configuration, count: int) -> Configuration:
     return config
 
 
-class _Ranges(NamedTuple):
-    """The ranges of both parameters: their names, and the lowest and the highest values."""
-
-    config: Configuration
-    parameters: tuple[str, ...]
-    low: Floats
-    high: Floats
-
-    @classmethod
-    def of(cls, config: Configuration) -> "_Ranges":
-        """Return the ranges of the sweeps of a configuration."""
-        values = [swept_values(sweep) for sweep in config.sweeps.values()]
-        names = tuple(sweep.parameter for sweep in config.sweeps.values())
-        low, high = (np.array([one[at] for one in values]) for at in (0, -1))
-        return cls(config, names, low, high)
-
-    def values(self, shares: Floats) -> Floats:
-        """Return the values of both parameters at shares of the ranges, (..., 2)."""
-        values: Floats = self.low + shares * (self.high - self.low)
-        return values
-
-    def system_at(self, shares: Floats) -> LaneSystem:
-        """Return the systems of lanes at shares of both ranges, (lanes, 2)."""
-        columns = dict(zip(self.parameters, self.values(shares).T, strict=True))
-        return system_of(self.config, columns, self.config.needed_effects)
-
-    def line(self, line: "_Line", number: int, lines: Sequence["_Line"]) -> BranchRange:
-        """Return the range along a line, which has a number among others."""
-
-        def systems(numbers: Integers, shares: Floats) -> LaneSystem:
-            values = np.empty((numbers.size, PARAMETERS))
-            fixed, value, low, high = np.array([one[:4] for one in lines])[numbers].T
-            at = fixed.astype(np.intp)
-            values[np.arange(at.size), at] = value
-            values[np.arange(at.size), 1 - at] = low + shares * (high - low)
-            columns = dict(zip(self.parameters, values.T, strict=True))
-            return system_of(self.config, columns, self.config.needed_effects)
-
-        def systems_of(at: Floats) -> LaneSystem:
-            values = {self.parameters[1 - line.number]: at}
-            values[self.parameters[line.number]] = np.full(at.size, line.value)
-            return system_of(self.config, values, self.config.needed_effects)
-
-        return BranchRange(systems_of, line.low, line.high, number, systems)
-
-    def whole(self, number: int, shares: Floats) -> "_Line":
-        """Return the line across the map through a place at shares (2,), see `_Line`."""
-        value = float(self.values(shares)[number])
-        return _Line(number, value, float(self.low[1 - number]), float(self.high[1 - number]))
-
-    def across(self, change: MapChange) -> "_Line":
-        """Return the line through both cells of a change of the map, and one cell beyond each."""
-        line = self.whole(change.number, change.shares)
-        here, beside = (one[1 - change.number] for one in (change.shares, change.other))
-        ends = np.clip(np.sort([2.0 * here - beside, 2.0 * beside - here]), 0.0, 1.0)
-        low, high = (float(self.values(np.full(PARAMETERS, one))[1 - line.number]) for one in ends)
-        return line._replace(low=low, high=high)
-
-    def along(self, line: "_Line", shares: Floats) -> float:
-        """Return the share of a line at which a place lies, at shares (2,) of both ranges."""
-        return float((self.values(shares)[1 - line.number] - line.low) / (line.high - line.low))
-
-    def shares(self, line: "_Line", along: float) -> Floats:
-        """Return the shares of both ranges, (2,), at a share of a line."""
-        values = np.full(PARAMETERS, line.low + along * (line.high - line.low))
-        values[line.number] = line.value
-        shares: Floats = (values - self.low) / (self.high - self.low)
-        return shares
-
-
-class _Line(NamedTuple):
-    """A line on which parameter ``number`` has a value, and the ends of the other parameter."""
-
-    number: int
-    value: float
-    low: float
-    high: float
-
-
 class _Begun(NamedTuple):
     """The beginning of a boundary: the point that was found, from a guess or a special point."""
 
@@ -257,7 +178,7 @@ class _Begun(NamedTuple):
 class _BoundarySearch:
     """The boundaries that are known so far; ``result`` gives the scales of the states."""
 
-    def __init__(self, over: _Ranges, run: RunPlan, longest: int, result: Result) -> None:
+    def __init__(self, over: Ranges, run: RunPlan, longest: int, result: Result) -> None:
         self.over, self.run, self.longest = over, run, longest
         self.found: list[TracedBoundary] = []
         self.left: Changes
@@ -292,7 +213,7 @@ class _BoundarySearch:
         return len(branches)
 
     def _from_branches(
-        self, branches: Sequence[tuple["_Line", TracedBranch]]
+        self, branches: Sequence[tuple[Line, TracedBranch]]
     ) -> list[Following["_Begun"]]:
         """Return the searches of boundaries at the special points of branches along lines."""
         return [
@@ -304,7 +225,7 @@ class _BoundarySearch:
 
     def _branches(
         self, result: Result, places: Sequence[tuple[int, float]]
-    ) -> Iterator[tuple["_Line", TracedBranch]]:
+    ) -> Iterator[tuple[Line, TracedBranch]]:
         """Trace the branches along lines side by side, and yield each with its line."""
         lines, of_lines = self._lines(result, places)
         searches = list[tuple[BranchSearch, Finding[None]]]()
@@ -313,26 +234,17 @@ class _BoundarySearch:
             search = BranchSearch(over, self.run, self.longest, APPROXIMATE, self.scale)
             across = known.axis_name(self.over.parameters[1 - line.number])
             searches.append((search, search.following(search.motions(of_line, across))))
-        self._traced_together([(search.over, one) for search, one in searches])
+        plan = self.run.plan
+        _traced_together([(search.over.steps_of_maps(plan), one) for search, one in searches])
         for line, (search, _) in zip(lines, searches, strict=True):
             axis = known.axis_name(self.over.parameters[line.number])
             say(f"{axis} = {line.value:.6g}: {len(search.found)} branches")
             for branch in search.found:
                 yield line, branch
 
-    def _traced_together(self, searches: list[tuple[BranchRange, Finding[Found]]]) -> list[Found]:
-        """Return the results of searches along lines; those with equal steps share calls."""
-        steps = [over.steps_of_maps(self.run.plan) for over, _ in searches]
-        found: dict[int, Found] = {}
-        for count in sorted({*steps}):
-            same = [at for at, of in enumerate(steps) if of == count]
-            results = run(together([searches[at][1] for at in same]), defects_of)
-            found.update(zip(same, results, strict=True))
-        return [found[at] for at in range(len(searches))]
-
     def _lines(
         self, result: Result, places: Sequence[tuple[int, float]]
-    ) -> tuple[list["_Line"], list[Result]]:
+    ) -> tuple[list[Line], list[Result]]:
         """Return the lines of a map that are nearest to some places, and what it has on them.
 
         ``places``: see `along_lines`.
@@ -342,9 +254,8 @@ class _BoundarySearch:
             axis = known.axis_name(self.over.parameters[number])
             wanted = float(self.over.values(np.full(PARAMETERS, share))[number])
             of_line = result.sel("nearest", **{axis: wanted})
-            ends = (float(of[1 - number]) for of in (self.over.low, self.over.high))
             # Where branches are traced, the line has exactly the value of its lanes.
-            lines.append(_Line(number, of_line.fixed[axis], *ends))
+            lines.append(self.over.whole(number, of_line.fixed[axis]))
             of_lines.append(of_line)
         return lines, of_lines
 
@@ -384,7 +295,7 @@ class _BoundarySearch:
             open_still &= ~(same & (left.period == one.period) & left.beside(one.shares))
         self.left = left.of(open_still)
 
-    def _across(self, jumps: Changes) -> list[tuple["_Line", TracedBranch]]:
+    def _across(self, jumps: Changes) -> list[tuple[Line, TracedBranch]]:
         """Trace the branch of each motion that jumps, across its cell and the next ones."""
         changes = [*jumps.each()]
         lines, searches = [self.over.across(one) for one in changes], []
@@ -392,8 +303,8 @@ class _BoundarySearch:
             over = self.over.line(line, number, lines)
             curve = over.curve(self.run.plan, one.period, self.scale)
             guess = np.append(one.state / self.scale, self.over.along(line, one.shares))
-            searches.append((over, _through(curve, guess)))
-        traced = self._traced_together(searches)
+            searches.append((curve.plan.steps_per_period, _through(curve, guess)))
+        traced = _traced_together(searches)
         return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
 
     def _from_changes(self, changes: Changes) -> list[Following["_Begun"]]:
@@ -429,7 +340,7 @@ class _BoundarySearch:
         return _Begun(equations, start, guess, None)
 
     def _from_special(
-        self, branch: TracedBranch, special: Special, line: "_Line"
+        self, branch: TracedBranch, special: Special, line: Line
     ) -> Following["_Begun"]:
         """Search the point of a boundary at a special point of a branch."""
         equations = self._equations(branch.period, special.kind, special.flank)
@@ -580,6 +491,19 @@ class _BoundarySearch:
             float(boundary.positions[located.number]),
             located.point.multipliers,
         )
+
+
+def _traced_together(searches: Sequence[tuple[int, Finding[Found]]]) -> list[Found]:
+    """Return the results of searches along lines; those with equal steps share calls.
+
+    Each has the number of steps per period that its curves take.
+    """
+    found: dict[int, Found] = {}
+    for count in sorted({steps for steps, _ in searches}):
+        same = [at for at, (steps, _) in enumerate(searches) if steps == count]
+        results = run(together([searches[at][1] for at in same]), defects_of)
+        found.update(zip(same, results, strict=True))
+    return [found[at] for at in range(len(searches))]
 
 
 def _through(curve: Curve, guess: Floats) -> Finding[TracedBranch | None]:

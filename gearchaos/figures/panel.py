@@ -163,7 +163,7 @@ def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> 
 
 
 def legend_entries(axes: Axes) -> list[Artist]:
-    """Return the entries of the legend of axes with their names, which patches in it have lost."""
+    """Return the entries of the legend of axes with their names, which areas in it have lost."""
     legend = axes.get_legend()
     if legend is None:
         return []
