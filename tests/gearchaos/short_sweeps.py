@@ -36,6 +36,32 @@ SHORT = (
     "outputs.section_points=8",
     "sweep.count=13",
 )
+PUMP = """
+[pair]
+teeth = [17, 53]
+normal_module_mm = 3.0
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 12.0
+face_width_mm = 25.0
+
+[operation]
+torque_Nm = 60.0
+speed_rpm = 9000.0
+
+[mesh]
+mean_stiffness_N_per_um_mm = 14.0
+circumferential_backlash_um = 120.0
+damping_ratio = 0.05
+stiffness = { shape = "trapezoid" }
+
+[pitch_error]
+amplitude_um = 8.0
+
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+"""
+"""A helical pair whose motions jump and double their period; without a sweep."""
+
 METHODS = ("rk4", "flow_map")
 RANDOM = ("start.kind=random", "start.seed=5", "start.count=3", "start.spread=0.7")
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
@@ -153,9 +152,9 @@ def test_of_several_files_the_map_is_the_one_that_is_refused(tmp_path, capsys):
     )
 
 
-def test_marks_of_values_leave_the_names_of_patches_in_the_legend():
+def test_marks_of_values_leave_the_names_of_areas_in_the_legend():
     axes = Figure().subplots()
-    legend_above(axes, [Patch(label="directions differ")])
+    legend_above(axes, [axes.fill_between([0.0, 1.0], 0.0, 1.0, label="directions differ")])
     mark_values([axes], "jumps", [0.5])
     named = [text.get_text() for text in axes.get_legend().get_texts()]
     assert named == ["jumps", "directions differ"]

@@ -11,29 +11,12 @@ from gearchaos.engine.bounding import find_boundaries
 from gearchaos.engine.branching import find_branches
 from gearchaos.records.branch import FOLD, GRAZING
 
+from .short_sweeps import PUMP
+
 SWEEP = Path(__file__).parents[2] / "sweeps" / "spur_pair.toml"
 LOAD = 0.1
 
-PUMP = """
-[pair]
-teeth = [17, 53]
-normal_module_mm = 3.0
-normal_pressure_angle_deg = 20.0
-helix_angle_deg = 12.0
-face_width_mm = 25.0
-
-[operation]
-torque_Nm = 60.0
-
-[mesh]
-mean_stiffness_N_per_um_mm = 14.0
-circumferential_backlash_um = 120.0
-damping_ratio = 0.05
-stiffness = { shape = "trapezoid" }
-
-[scene]
-effects = ["pitch_error", "stiffness_variation", "backlash"]
-
+SPEED_AND_ERROR = """
 [sweep]
 parameter = "operation.speed_rpm"
 from = 6000.0
@@ -109,7 +92,7 @@ def test_every_special_point_of_a_branch_lies_on_a_curve():
 
 def test_every_special_point_is_on_a_curve_where_the_map_of_rk4_jumps():
     # At a grazing, steps of Newton's method stop shrinking at 1e-9.
-    result = gearchaos.run(gearchaos.Configuration.from_toml(PUMP, "pump.toml"))
+    result = gearchaos.run(gearchaos.Configuration.from_toml(PUMP + SPEED_AND_ERROR, "pump.toml"))
     found = find_boundaries(result, lines=2)
     assert len(found.boundaries) >= 12
     assert all(one.arclength.size > 1 for one in found.boundaries)
