@@ -58,9 +58,8 @@ class BoundariesOptions(NamedTuple):
     lines: Annotated[
         int,
         Option(
-            "lines across the map from which curves are started besides the changes of the map; "
-            "more lines find smaller closed curves (default: %(default)s in each direction, but "
-            "one in a direction in which every value needs flow maps of its own)",
+            "lines across the map from which more curves start (default: %(default)s in each "
+            "direction, one where every value needs its own flow maps)",
             "N",
             low=1,
             high=1000,
