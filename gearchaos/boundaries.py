@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.options import Option, Overwrite, Place, placed_coordinates
-from gearchaos.progress import say
+from gearchaos.progress import count_of, say
 
 if TYPE_CHECKING:
     from gearchaos.results.files.boundary_file import BoundarySet
@@ -128,7 +128,8 @@ def table(found: "BoundarySet") -> list[str]:
         )
         kind = f"{one.kind} of {one.flank}" if one.flank else one.kind
         lines.append(
-            f"curve {number}, {kind}, period {one.period}: {ranges}, {one.arclength.size} points; "
+            f"curve {number}, {kind}, period {one.period}: {ranges}, "
+            f"{count_of(one.arclength.size, 'point')}; "
             f"ends: {'; '.join(dict.fromkeys(one.ends))}"
         )
         for point in one.points:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.options import Option, Overwrite, Place, placed_coordinates
-from gearchaos.progress import say
+from gearchaos.progress import count_of, say
 
 if TYPE_CHECKING:
     from gearchaos.results.files.branch_file import BranchSet
@@ -100,7 +100,7 @@ def table(found: "BranchSet") -> list[str]:
         low, high = float(branch.value.min()), float(branch.value.max())
         lines.append(
             f"branch {number}, period {branch.period}: {name} {low:.6g} to {high:.6g}, "
-            f"{branch.value.size} orbits, {int(branch.stable.sum())} stable; ends: "
+            f"{count_of(branch.value.size, 'orbit')}, {int(branch.stable.sum())} stable; ends: "
             f"{'; '.join(dict.fromkeys(branch.ends))}"
         )
         lines += [

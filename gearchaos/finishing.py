@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, TOO_MANY_DIVERGED
 from gearchaos.errors import FileError
-from gearchaos.progress import complain, say
+from gearchaos.progress import complain, count_of, say
 
 if TYPE_CHECKING:
     from gearchaos.engine.run_plan import RunPlan
@@ -64,7 +64,7 @@ def ending(run: "RunPlan", output: str, diverged: int, *said: str, as_json: bool
     if diverged <= allowed * len(run.lanes):
         return OK
     complain(
-        f"{diverged} of {len(run.lanes)} lanes diverged"
+        f"{diverged} of {count_of(len(run.lanes), 'lane')} diverged"
         f"{' or were too fast' if METHODS[run.plan.method].shares_maps else ''}, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
         "raise integration.steps_per_period, or check the load and the start state"
@@ -96,5 +96,5 @@ def complete_already(run: "RunPlan", output: str, *, as_json: bool = False) -> i
         with suppress(FileError), open_store(run, output, resume=True) as store:
             store.remove()
     diverged = int((found["status"] != 0).sum())
-    text = f"complete already: {found['status'].size} lanes, {diverged} diverged"
+    text = f"complete already: {count_of(found['status'].size, 'lane')}, {diverged} diverged"
     return ending(run, output, diverged, text, as_json=as_json)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from gearchaos.command_line import Command
 from gearchaos.finishing import output_of
 from gearchaos.options import Option, OutputFile, Overwrite, Threads
-from gearchaos.progress import progress, say
+from gearchaos.progress import count_of, progress, say
 
 if TYPE_CHECKING:
     from gearchaos.identification.loading import Problem
@@ -77,7 +77,7 @@ def _identify(options: IdentifyOptions) -> None:
         check_output(output, options.overwrite)
     began = time.monotonic()
     tried = _search(problem, known, output, facts)
-    say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
+    say(f"{output}: {count_of(len(tried), 'candidate')}, {time.monotonic() - began:.1f} s")
     print("\n".join(report(problem, tried)), flush=True)
 
 

@@ -12,6 +12,7 @@ from gearchaos.command_line import OK, Command
 from gearchaos.errors import FileError
 from gearchaos.finishing import complete_already, ending
 from gearchaos.options import Option, Overwrite
+from gearchaos.progress import count_of
 
 if TYPE_CHECKING:
     from gearchaos.models import Configuration
@@ -75,7 +76,7 @@ def _merge(options: MergeOptions) -> int:
         told = variables_of(run), run.lanes.parameters, facts
         order = run.lanes.computed_at if run.lanes.reordered else None
         store.merge(*told, overwrite=options.overwrite, found=found, computed_at=order)
-    text = f"{store.lanes} lanes, {tally.diverged} diverged"
+    text = f"{count_of(store.lanes, 'lane')}, {tally.diverged} diverged"
     return ending(run, output, tally.diverged, text, *tally.remarks)
 
 

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from gearchaos.command_line import Command
 from gearchaos.errors import FigureError
 from gearchaos.options import Option, Overwrite, Place, Units, placed_coordinates
-from gearchaos.progress import progress, say
+from gearchaos.progress import count_of, progress, say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
@@ -257,7 +257,8 @@ def _plot_branches(options: PlotOptions) -> None:
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     drawn = _write(sheets, targets, options)
     orbits = sum(one.value.size for one in found.branches)
-    say(f"{len(found.branches)} branches, {orbits} orbits over {found.parameter.name}, {drawn}")
+    held = f"{count_of(len(found.branches), 'branch', 'branches')}, {count_of(orbits, 'orbit')}"
+    say(f"{held} over {found.parameter.name}, {drawn}")
 
 
 def _plot_boundaries(options: PlotOptions) -> None:

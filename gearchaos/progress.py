@@ -47,6 +47,11 @@ def standing_streams() -> Iterator[None]:
         yield
 
 
+def count_of(number: int, noun: str, several: str = "") -> str:
+    """Return a number with its noun: 1 lane, 2 branches; ``several``: plural, by default with s."""
+    return f"{number} {noun if number == 1 else several or noun + 's'}"
+
+
 def print_error(text: str) -> None:
     """Print text on stderr; if stderr is closed or full, the text is lost without an error."""
     # With file=None, print would write to stdout.

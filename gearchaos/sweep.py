@@ -23,7 +23,7 @@ from gearchaos.options import (
     Settings,
     Threads,
 )
-from gearchaos.progress import say
+from gearchaos.progress import count_of, say
 
 if TYPE_CHECKING:
     from gearchaos.engine.run_plan import RunPlan
@@ -146,7 +146,10 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             _add_remedy(fault, store, output, options)
             raise
-    said = [f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks]
+    said = [
+        f"{count_of(store.own_lanes, 'lane')}, {tally.diverged} diverged, {seconds:.1f} s",
+        *tally.remarks,
+    ]
     if shard is None:
         return ending(run, output, tally.diverged, *said, as_json=options.json)
     if options.json:
@@ -158,7 +161,7 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
         used = len(shared_blocks(len(run.lanes), shard.of))
         said = [
             f"shard {options.shard} has no lanes: the {len(run.lanes)} lanes of the sweep are "
-            f"{used} block{'s' if used > 1 else ''}, one for each of the first {used} shards; "
+            f"{count_of(used, 'block')}, one for each of the first {used} shards; "
             "fewer shards are enough"
         ]
     say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")

@@ -33,7 +33,7 @@ from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
-from gearchaos.progress import progress, say
+from gearchaos.progress import count_of, progress, say
 from gearchaos.records.boundary import BOUNDARY_KINDS, RESONANCES, Boundary, BoundaryPoint
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -127,7 +127,9 @@ def find_boundaries(
                 some = places[first : first + SIDE_BY_SIDE]
                 branches = search.along_lines(result, some)
                 bar.update(len(some))
-                say(f"{len(some)} lines: {branches} branches; {len(search.found)} boundaries")
+                known = count_of(len(search.found), "boundary", "boundaries")
+                traced = count_of(branches, "branch", "branches")
+                say(f"{count_of(len(some), 'line')}: {traced}; {known}")
             search.from_changes()
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{bar.n} of {len(places)} lines were searched")
@@ -238,7 +240,8 @@ class _BoundarySearch:
         _traced_together([(search.over.steps_of_maps(plan), one) for search, one in searches])
         for line, (search, _) in zip(lines, searches, strict=True):
             axis = known.axis_name(self.over.parameters[line.number])
-            say(f"{axis} = {line.value:.6g}: {len(search.found)} branches")
+            traced = count_of(len(search.found), "branch", "branches")
+            say(f"{axis} = {line.value:.6g}: {traced}")
             for branch in search.found:
                 yield line, branch
 

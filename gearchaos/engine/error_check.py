@@ -8,6 +8,7 @@ from gearchaos_kernels import Status
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.outputs.names import SECTION
+from gearchaos.progress import count_of
 from gearchaos.records.control import CAPTURE_MEANINGS, CAPTURED, NO_GAIN, NO_ORBIT, OFF
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
@@ -105,9 +106,9 @@ class Tally:
             ),
             (
                 self._mixed,
-                f"{self._mixed} lanes are periodic in the end, but chaos or another motion came "
-                "before within their records (record in the file); their exponents are those of "
-                "the orbits",
+                f"{count_of(self._mixed, 'lane')} periodic in the end, but with chaos or another "
+                "motion before within the record (record in the file); the exponent of such a lane "
+                "is that of the orbit",
             ),
             (
                 self._controlled,
@@ -116,12 +117,13 @@ class Tally:
             ),
             (
                 self._without_orbit,
-                f"{self._without_orbit} lanes ran without control: the orbit does not exist there",
+                f"{count_of(self._without_orbit, 'lane')} ran without control: the orbit does not "
+                "exist there",
             ),
             (
                 self._without_gain,
-                f"{self._without_gain} lanes ran without control: no gain stabilises the orbit "
-                "there",
+                f"{count_of(self._without_gain, 'lane')} ran without control: no gain stabilises "
+                "the orbit there",
             ),
         )
         return [text for found, text in remarks if found]
@@ -133,7 +135,7 @@ class Tally:
         section, exponent, motion, of_record, of_kept = found
         if motion.size == 0:
             return ""
-        text = f"{motion.size} lanes computed again with half the step: "
+        text = f"{count_of(motion.size, 'lane')} computed again with half the step: "
         periodic = np.isfinite(section)
         if periodic.any():
             text += f"section of {periodic.sum()} periodic ones off by {_spread(section[periodic])}"
