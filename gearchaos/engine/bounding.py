@@ -127,9 +127,9 @@ def find_boundaries(
                 some = places[first : first + SIDE_BY_SIDE]
                 branches = search.along_lines(result, some)
                 bar.update(len(some))
-                known = count_of(len(search.found), "boundary", "boundaries")
                 traced = count_of(branches, "branch", "branches")
-                say(f"{count_of(len(some), 'line')}: {traced}; {known}")
+                found = count_of(len(search.found), "boundary", "boundaries")
+                say(f"{count_of(len(some), 'line')}: {traced}; {found}")
             search.from_changes()
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{bar.n} of {len(places)} lines were searched")
