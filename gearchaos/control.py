@@ -182,12 +182,17 @@ def _values(places: tuple[Place, ...], config: "Configuration") -> dict[str, flo
 
 
 MEASURES = {
-    "load_factor_largest": "load factor",
+    "load_factor_largest": "largest mesh force over the static one",
     "transmission_error_peak_to_peak": "transmission error, peak to peak",
 }
-"""Names of the outputs that are compared, in words; those of contact and of elements follow."""
+"""Names of the outputs that are compared, in words."""
 
-OF_ELEMENTS = ("time_apart", "force_largest", "gap_peak_to_peak")
+OF_ELEMENTS = {
+    "time_apart_": "share of the time apart, {}",
+    "force_largest_": "largest force, {}",
+    "gap_peak_to_peak_": "gap, peak to peak, {}",
+}
+"""Beginnings of the names of outputs of elements that are compared, in words with the element."""
 
 
 def table(facts: dict[str, Any], periods: str) -> list[str]:
@@ -216,14 +221,23 @@ def table(facts: dict[str, Any], periods: str) -> list[str]:
     ]
     if facts["captured"]:
         lines += [f"once captured {_effort(facts, 'final_effort')}"]
-    lines += ["                                     before   after"]
+    lines += [
+        "means over the starts, lengths and forces in the units of the equations:",
+        f"{'':42} before   after",
+    ]
     for name, value in facts["before"].items():
-        words = MEASURES.get(name)
-        if name.startswith(OF_ELEMENTS):
-            words = name.replace("_", " ")
+        words = _measure(name)
         if words and name in facts["after"]:
-            lines += [f"  {words:34} {value:<8.4g} {facts['after'][name]:.4g}"]
+            lines += [f"  {words:40} {value:<8.4g} {facts['after'][name]:.4g}"]
     return lines
+
+
+def _measure(name: str) -> str:
+    """Return an output in words, empty if it is not compared."""
+    for begin, words in OF_ELEMENTS.items():
+        if name.startswith(begin):
+            return words.format(name.removeprefix(begin).replace("_", " "))
+    return MEASURES.get(name, "")
 
 
 def _number(value: complex) -> str:

@@ -15,10 +15,17 @@ if TYPE_CHECKING:
     from gearchaos.engine.run_plan import RunPlan
 
 
+WRITTEN_BY = dict.fromkeys((".png", ".pdf", ".svg"), "plot")
+WRITTEN_BY |= dict.fromkeys((".csv", ".mat", ".parquet"), "export")
+WRITTEN_BY |= {".html": "report"}
+"""Endings of files that other commands write from a result."""
+
+
 def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
     """Return the path of the result: that of --output, or one named after the configuration.
 
-    Raises FileError if this is the configuration itself, or a stream instead of a file.
+    Raises FileError if this is the configuration itself, a stream instead of a file, or a result in
+    HDF5 whose name ends as that of another format.
     """
     if (output or config) == "-":
         raise FileError("-: a result is a file, not a stream, and needs a name; give --output PATH")
@@ -28,6 +35,12 @@ def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
     with suppress(OSError, ValueError):  # One of the two does not exist.
         if os.path.samefile(output, config):
             raise FileError(f"{output}: is the input itself; choose another --output")
+    kind = Path(output).suffix.lower()
+    if suffix.endswith(".h5") and kind in WRITTEN_BY:
+        raise FileError(
+            f"{output}: this command writes an HDF5 file, which {kind} is no ending for; give a "
+            f"name that ends in .h5, and then use gearchaos {WRITTEN_BY[kind]}"
+        )
     return output
 
 

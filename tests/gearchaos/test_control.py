@@ -187,10 +187,16 @@ def test_the_command_prints_a_table_and_json_and_draws(tmp_path):
     assert done.code == 0, done.err
     assert "captured: 30 of 30 starts, 100.0 % (88.6 % to 100.0 %)" in done.out
     assert (tmp_path / "pair.png").stat().st_size > 10_000
+    printed = done.out
     done = run_module("gearchaos.control", *options, "--json", cwd=tmp_path)
     facts = json.loads(done.out)
     assert facts["multipliers"][0][0] == pytest.approx(-1.6976, abs=1e-4)
-    assert facts["after"]["load_factor_largest"] < facts["before"]["load_factor_largest"]
+    before, after = (facts[when]["load_factor_largest"] for when in ("before", "after"))
+    assert after < before
+    line = f"  largest mesh force over the static one   {before:<8.4g} {after:.4g}"
+    heading = "means over the starts, lengths and forces in the units of the equations:"
+    assert {line, heading} <= {*printed.splitlines()}
+    assert "  share of the time apart, tangential " in printed
 
 
 def test_the_command_names_an_orbit_that_is_not_there(tmp_path):

@@ -127,6 +127,8 @@ def test_a_configuration_that_cannot_be_read_is_code_4(tmp_path, config, message
         ("", "'': is not a file name; give the name of a file"),
         (os.devnull, f"{os.devnull}: is not a regular file; give the name of a file"),
         ("gears.toml", "gears.toml: is the input itself; choose another --output"),
+        ("gears.PNG", "gears.PNG: this command writes an HDF5 file, which .png is no ending for;"),
+        ("gears.csv", "and then use gearchaos export"),
     ],
 )
 def test_an_output_that_cannot_be_is_code_4_before_anything_is_computed(tmp_path, output, message):
