@@ -313,8 +313,9 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         taken = 0
         while (further := _joinable(points[-1], trials[taken:])) is not None:
             here, last, taken = points[-1], further[-1], taken + len(further)
-            if len(points) > 2 and (yield from _meets(curve, here, last, start)):
-                return [*points, *further], CLOSED_CURVE
+            met = (yield from _met(curve, here, last, start)) if len(points) > 2 else None
+            if met is not None:
+                return [*points, *_before(met, further), met], CLOSED_CURVE
             points += further
         if taken and stalls(points, STALLED):
             return points, _end_of(curve, points[-1])
@@ -457,13 +458,20 @@ def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
     return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
 
 
-def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint) -> Finding[bool]:
-    """Search whether the first orbit of a branch lies between two others, in its direction.
+def _before(end: CurvePoint, points: Sequence[CurvePoint]) -> list[CurvePoint]:
+    """Return the points of a curve that lie before one near them."""
+    return [one for one in points if (end.place - one.place) @ end.tangent > SAME_PLACE]
+
+
+def _met(
+    curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint
+) -> Finding[CurvePoint | None]:
+    """Search the first orbit of a branch between two others, in their direction; None without it.
 
     A curve of a longer period may come back to this orbit at another of its section points.
     """
     if trial.tangent[-1] * start.tangent[-1] <= 0.0:
-        return False
+        return None
     chord = trial.place - here.place
     length = float(np.linalg.norm(chord))
     for point in start.section / curve.scale:
@@ -474,5 +482,5 @@ def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint)
             (guess,) = cubic(here, trial, np.array([along / length]))
             found = yield from _abreast(curve, guess, chord / length, target)
             if found is not None and np.max(np.abs(found.place - target)) < SAME_PLACE:
-                return True
-    return False
+                return found
+    return None
