@@ -22,7 +22,7 @@ from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.options import ConfigFile, Option, Overwrite, Place, Threads, placed_coordinates
-from gearchaos.progress import say
+from gearchaos.progress import count_of, say
 
 if TYPE_CHECKING:
     from gearchaos.controlling.controller import Controller
@@ -151,8 +151,8 @@ def _missing(options: ControlOptions, found: int) -> str:
             "multiples of their number only)"
         )
     return (
-        f"{found} orbits of period {options.period} were found near the motion, and --orbit "
-        f"{options.orbit} is not among them; choose one below {found}, or another --period"
+        f"found only {count_of(found, 'orbit')} of period {options.period} near the motion, and "
+        f"--orbit {options.orbit} is not among them; choose one below {found}, or another --period"
     )
 
 

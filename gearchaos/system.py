@@ -614,8 +614,12 @@ class System:
 
     @property
     def _plan(self) -> Plan:
-        """The plan of an integration with these steps."""
-        return plan_of(self.config, steps_per_period=self._steps)
+        """The plan of an integration with these steps.
+
+        With a tangent vector everywhere: to compile another kernel without it takes longer than the
+        vectors of one motion.
+        """
+        return plan_of(self.config, steps_per_period=self._steps, tangent=True)
 
     def _require_sound(self, outcome: kernels.Outcome) -> None:
         """Raise a ConfigurationError if the motion of the only lane diverged."""

@@ -55,7 +55,7 @@ def embedded_orbits(system: LaneSystem, section: Floats, period: int, plan: Plan
     found = polish(lanes, section[close], periods, plan, scale)
     closed = np.flatnonzero(found.converged)
     whole = period * system.repeats_after
-    once = Plan(plan.steps_per_period, 0, whole, whole, method=plan.method)
+    once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
     closed = closed[_first_of_each(system, found.points[closed], scale, once)]
     order = np.argsort(np.abs(found.multipliers[closed, 0]), kind="stable")
     return found.of(closed[order])

@@ -158,8 +158,9 @@ class BranchSearch:
                 transient_periods=0,
                 recorded_periods=whole,
                 section_points=whole,
-                tangent=False,
-                contact=False,
+                # The kernel is then that of the branches.
+                tangent=True,
+                contact=True,
                 loads=False,
                 states=(),
                 orders=(),
@@ -351,7 +352,6 @@ def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[
         transient_periods=0,
         recorded_periods=whole,
         section_points=0,
-        tangent=False,
         states=(),
         orders=(),
     )

@@ -267,7 +267,7 @@ def _followed(config: Configuration, edge: Array, last: Floats, width: float = n
     if lanes.size:
         # If a longer record was labelled, the end of the first record may be far from the orbit.
         longer = sum(LONGER_RECORDS) * config.integration.recorded_periods
-        further = plan_of(config, transient_periods=longer, recorded_periods=0)
+        further = plan_of(config, transient_periods=longer, recorded_periods=0, tangent=True)
         state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     return follow(

@@ -232,7 +232,8 @@ def pilot(lanes: Lanes, plan: Plan, count: int, finest: int) -> tuple[int, Calla
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
-    settling = Plan(finest, plan.transient_periods, 0, section_points=0, method=plan.method)
+    # With the tangent of the plan: the kernel is then the one that is used next.
+    settling = Plan(finest, plan.transient_periods, 0, 0, tangent=plan.tangent, method=plan.method)
     check()
     common = integrate(system, lanes.start_of(numbers), settling).end_state
 

@@ -17,6 +17,7 @@ from gearchaos.engine.run_plan import RunPlan
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import axis_values
 from gearchaos.models.registry import system_of
+from gearchaos.progress import count_of
 from gearchaos.records.period import coordinate_scale
 
 LEAST_TRANSIENT = 300
@@ -95,7 +96,10 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
     repeats = system.repeats_after
     transient = max(-(-plan.transient_periods // repeats), LEAST_TRANSIENT) * repeats
     length = CLOSE_RETURN_RECORD * repeats
-    record = kernels.Plan(plan.steps_per_period, transient, length, length, method=plan.method)
+    # With a tangent: the kernel is then that of the orbits.
+    record = kernels.Plan(
+        plan.steps_per_period, transient, length, length, tangent=True, method=plan.method
+    )
     start = start_states(run.config, system, np.zeros(1, dtype=np.intp))
     outcome = kernels.integrate(system, start, record)
     found = np.zeros((0, start.shape[1]))
@@ -109,9 +113,10 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
         )
     if control.number >= len(found):
         raise ConfigurationError(
-            f"{run.config.source}: control.number = {control.number}: {len(found)} orbits of "
-            f"period {control.period} were found near the motion{wanted.place}; choose a smaller "
-            "control.number, or another control.period or control.found_at"
+            f"{run.config.source}: control.number = {control.number}: found only "
+            f"{count_of(len(found), 'orbit')} of period {control.period} near the motion"
+            f"{wanted.place}; choose a smaller control.number, or another control.period or "
+            "control.found_at"
         )
     point: Floats = found[control.number]
     return point

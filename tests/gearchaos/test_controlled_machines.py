@@ -184,7 +184,7 @@ def test_a_sweep_of_machines_is_controlled_and_drawn(tmp_path):
     (tmp_path / "masses.toml").write_text(config.resolved_toml())
     done = run_module("gearchaos.sweep", "masses.toml", cwd=tmp_path)
     assert done.code == 0, done.err
-    assert "1 lanes ran without control: the orbit does not exist there" in done.err
+    assert "1 lane ran without control: the orbit does not exist there" in done.err
     result = gearchaos.open_result(tmp_path / "masses.h5")
     assert result["capture"][1].tolist() == [CAPTURED, CAPTURED, NO_ORBIT]
     assert result["period"][0, :2].tolist() == [2, 2]

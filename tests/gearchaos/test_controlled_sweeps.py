@@ -146,7 +146,7 @@ def test_lanes_without_the_orbit_run_uncontrolled_and_are_counted(tmp_path):
     (tmp_path / "pair.toml").write_text(config.resolved_toml())
     done = run_module("gearchaos.sweep", "pair.toml", "-o", "pair.h5", cwd=tmp_path)
     assert done.code == 0, done.err
-    assert "1 lanes ran without control: the orbit does not exist there" in done.err
+    assert "1 lane ran without control: the orbit does not exist there" in done.err
     result = gearchaos.open_result(tmp_path / "pair.h5")
     assert result["capture"].tolist() == [NO_ORBIT, CAPTURED, CAPTURED]
     assert result["effort_largest"][0] == 0.0
@@ -244,7 +244,9 @@ def test_keys_of_a_missing_controller_cannot_be_swept():
 
 
 def test_an_orbit_that_is_not_found_and_a_torque_that_is_missing_are_named():
-    with pytest.raises(ConfigurationError, match=r"control.number = 9: 1 orbits of period 1"):
+    with pytest.raises(
+        ConfigurationError, match=r"control.number = 9: found only 1 orbit of period 1"
+    ):
         gearchaos.run(short(control__number=9))
     with pytest.raises(ConfigurationError, match=r"control.limit_Nm: needs operation.torque_Nm"):
         gearchaos.run(short(control={"limit_Nm": 1.0}))

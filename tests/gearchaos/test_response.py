@@ -250,7 +250,7 @@ def test_diverged_lanes_are_kept_and_reported(tmp_path, capsys):
     assert main(asked) == 3
     out, err = capsys.readouterr()
     assert out == f"{output}\n"
-    assert "1 of 1 lanes diverged" in err
+    assert "1 of 1 lane diverged" in err
     assert open_result(output)["diverged_period"][0] >= 0
 
 
