@@ -49,7 +49,10 @@ def embedded_orbits(system: LaneSystem, section: Floats, period: int, plan: Plan
     returns = np.max(np.abs(section[period:] - section[:-period]) / scale, axis=1)
     before, after = np.roll(returns, 1), np.roll(returns, -1)
     (close,) = np.nonzero((returns < CLOSE) & (returns <= before) & (returns <= after))
-    close = close[np.argsort(returns[close], kind="stable")][:MOST_GUESSES]
+    close = close[np.argsort(returns[close], kind="stable")]
+    # A motion that has settled returns to the same place all the time.
+    _, first = np.unique(np.rint(section[close] / (SAME_ORBIT * scale)), axis=0, return_index=True)
+    close = close[np.sort(first)][:MOST_GUESSES]
     lanes = system.of(np.zeros(close.size, dtype=np.intp))
     periods = np.full(close.size, period, np.int32)
     found = polish(lanes, section[close], periods, plan, scale)

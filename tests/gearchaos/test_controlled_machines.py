@@ -276,7 +276,7 @@ def test_the_frame_of_a_controlled_train_has_the_designed_multipliers(controller
 def test_a_sweep_of_a_planetary_set_is_controlled():
     config = gearchaos.load_config(PLANETARY).replace(
         {
-            "sweep": {"parameter": "operation.speed_rpm", "values": [2000.0, 2050.0]},
+            "sweep": {"parameter": "operation.speed_rpm", "values": [2000.0, 2010.0]},
             "integration": {"method": "flow_map", "transient_periods": 300, "recorded_periods": 20},
             "control": {"limit": 0.1},
             "outputs": {"section": ["carrier_u"], "section_points": 10, "lyapunov": False},
