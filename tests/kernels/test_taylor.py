@@ -19,14 +19,14 @@ from .piecewise import (
 )
 from .reference import assert_same_bits, lanes_out_of
 
-WITHOUT_LOADS = WITH_LOADS | {"loads": False, "method": "taylor"}
+SERIES = WITH_LOADS | {"method": "taylor"}
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 @pytest.mark.parametrize("steps", [1, 4, 30])
 def test_series_are_exact_where_elements_of_every_kind_cross(size, steps):
     machines, start, section, growth, crossings = exact(*size)
-    found = integrate(lanes_of(machines), start, Plan(steps, **WITHOUT_LOADS))
+    found = integrate(lanes_of(machines), start, Plan(steps, **SERIES))
     assert crossings.sum() >= 20
     assert found.crossings.tolist() == crossings.tolist()
     assert found.section == pytest.approx(section, abs=1e-11)
@@ -46,15 +46,15 @@ def test_series_are_exact_where_elements_of_every_kind_cross(size, steps):
 def test_series_are_exact_for_random_systems_with_and_without_springs_to_the_ground(
     size, seed, held, steps
 ):
-    assert_exact(random_machine(seed, *size, held), seed, Plan(steps, **WITHOUT_LOADS))
+    assert_exact(random_machine(seed, *size, held), seed, Plan(steps, **SERIES))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_contact_and_crossings_are_those_of_flow_maps(size):
     machines, start, _, _, _ = exact(*size)
     system = lanes_of(machines)
-    found = integrate(system, start, Plan(4, **WITHOUT_LOADS))
-    maps = integrate(system, start, Plan(60, **WITHOUT_LOADS | {"method": "flow_map"}))
+    found = integrate(system, start, Plan(4, **SERIES))
+    maps = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map"))
     # Flow maps take the speed of a crossing before the last correction of its moment.
     assert found.contact == pytest.approx(maps.contact, rel=1e-8, abs=1e-8)
     assert found.slowest_crossing == pytest.approx(maps.slowest_crossing, rel=1e-6)
@@ -65,7 +65,7 @@ def test_series_record_the_loads_of_fine_steps(size):
     machines, start, _, _, _ = exact(*size)
     system = lanes_of(machines)
     wanted = integrate(system, start, Plan(3200, **WITH_LOADS)).loads
-    found = integrate(system, start, Plan(4, **WITH_LOADS, method="taylor")).loads
+    found = integrate(system, start, Plan(4, **SERIES)).loads
     size = np.abs(wanted[..., :2]).max(axis=2)
     # Forces jump where dampers act in contact only; 240 steps and 3200 steps sample that.
     assert (np.abs(found[..., :2] - wanted[..., :2]).max(axis=2) <= 2e-3 * size).all()
@@ -78,7 +78,7 @@ def crowd():
     system = lanes_of([random_machine(n % 3, 6, 4) for n in range(43)])
     start = 0.5 * np.random.default_rng(3).normal(size=(system.lanes, 12))
     start[5] = np.nan
-    plan = Plan(4, **WITHOUT_LOADS)
+    plan = Plan(4, **SERIES)
     return system, start, plan, integrate(system, start, plan)
 
 

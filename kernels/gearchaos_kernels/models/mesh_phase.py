@@ -66,18 +66,9 @@ def nearest_row(number, fraction, table_rows):
 
 @scalar
 def turned(sine, cosine, angle):
-    """Return sine and cosine of a phase that is a small angle, in rad, further on."""
-    square = angle * angle
-    sine_of_angle = angle * (
-        1.0
-        - square
-        * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
-    )
-    cosine_of_angle = 1.0 - square * (
-        0.5
-        - square
-        * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0)))
-    )
+    """Return sine and cosine of a phase that is an angle, in rad, further on."""
+    # With few steps and high harmonics the angle is not small.
+    sine_of_angle, cosine_of_angle = math.sin(angle), math.cos(angle)
     return (
         sine * cosine_of_angle + cosine * sine_of_angle,
         cosine * cosine_of_angle - sine * sine_of_angle,
