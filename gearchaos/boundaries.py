@@ -61,7 +61,7 @@ class BoundariesOptions(NamedTuple):
             "lines across the map from which more curves start (default: %(default)s in each "
             "direction, one where every value needs its own flow maps)",
             "N",
-            low=1,
+            low=0,
             high=1000,
         ),
     ] = 4

@@ -159,9 +159,7 @@ def add_boundaries(figure: Page, found: BoundarySet, parameters: Sequence[str]) 
         handles = [draw_boundaries(axes, found, parameters) for axes in figure.axes]
         if handles[0]:
             # The legend takes the place of the footnote, which becomes its title.
-            width = figure.get_size_inches()[0] * 25.4
-            columns = 2 if width < 1.5 * SINGLE_COLUMN_MM else 5
-            legend_below(figure, handles[0], figure.get_supxlabel() or None, columns)
+            legend_below(figure, handles[0], figure.get_supxlabel() or None, 5)
             footnote(figure, " ")
 
 

@@ -141,9 +141,17 @@ def footnote(figure: Figure, text: str) -> None:
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], title: str | None, columns: int) -> Legend:
-    """Place a legend below everything in a figure with constrained layout."""
-    look = {"loc": "outside lower center", "ncols": min(len(handles), columns), **LEGEND}
-    return figure.legend(handles=handles, title=title, **look)
+    """Place a legend below everything in a figure with constrained layout.
+
+    It has as many of the columns as fit into the width of the figure.
+    """
+    look = {"loc": "outside lower center", **LEGEND}
+    for count in range(min(len(handles), columns), 1, -1):
+        legend = figure.legend(handles=handles, title=title, ncols=count, **look)
+        if legend.get_window_extent().width <= figure.bbox.width:
+            return legend
+        legend.remove()
+    return figure.legend(handles=handles, title=title, ncols=1, **look)
 
 
 def few_ticks(axes: Axes, x: int | None = 5, y: int | None = 4) -> None:

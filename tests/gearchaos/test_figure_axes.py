@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
 from gearchaos.figures.labels import axis_label, in_words
+from gearchaos.figures.page import legend_below
 from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import HATCHES
 from gearchaos.figures.style import OVERLAID
@@ -20,6 +22,18 @@ from .test_result_axes import AXES, result_over
 BOTH = result_over(AXES["two parameters"])
 STARTS = result_over(AXES["several starts"])
 STARTS["period"][:] = 1
+
+
+@pytest.mark.parametrize("width", [85.0, 130.0, 180.0])
+def test_a_legend_below_a_page_has_the_columns_that_fit(width):
+    figure = Figure(figsize=(width / 25.4, 4.0), layout="constrained")
+    handles = [Line2D([], [], label=f"entry {n} of a dozen long ones") for n in range(12)]
+    legend = legend_below(figure, handles, None, 5)
+    one = Figure().legend(handles=handles[:1]).get_window_extent().width
+    assert legend.get_window_extent().width <= figure.bbox.width
+    # With two more columns it would not fit; there are five at most.
+    assert legend._ncols == 5 or (legend._ncols + 2) * one > figure.bbox.width
+    assert figure.legends == [legend]
 
 
 @pytest.mark.parametrize("draw", [bifurcation, lyapunov])
