@@ -145,7 +145,7 @@ def _save(result: "Result", options: ExploreOptions) -> None:
     from gearchaos.results.reading.physical_units import in_units
 
     for path in filter(None, (options.branches, options.boundaries, options.result)):
-        output = output_of(options.save, path)
+        output = output_of(options.save, path, ".html")
     check_output(output, options.overwrite)
     part = result.sel("within", **placed_coordinates(options.at, result.axes, result.axis))
     given = (options.branches, options.boundaries)
