@@ -42,7 +42,7 @@ from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.recomputing import computable
-from gearchaos.engine.response import respond
+from gearchaos.engine.response import respond, sampled_steps
 from gearchaos.engine.run_plan import plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.engine.steps import stable_steps
@@ -239,10 +239,17 @@ class System:
         """
         periods = whole_number("periods", periods, least=1)
         transient = whole_number("transient", transient, least=0)
+        return self._moved(self._steps, periods, transient, self._start(start))
+
+    def _moved(self, steps: int, periods: int, transient: int, start: Floats) -> Trajectory:
+        """Return a motion from a start (1, states) with a number of steps per mesh period."""
         plan = self._plan._replace(
-            transient_periods=transient, recorded_periods=periods, history_periods=periods
+            steps_per_period=steps,
+            transient_periods=transient,
+            recorded_periods=periods,
+            history_periods=periods,
         )
-        outcome = kernels.integrate(self._record, self._start(start), plan)
+        outcome = kernels.integrate(self._record, start, plan)
         self._require_sound(outcome)
         states = outcome.history[0]
         return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states, transient)
@@ -561,9 +568,13 @@ class System:
         """
         state = self.states[0] if state is None else state
         one_of("state", state, self.states)
-        motion = self.integrate(periods, transient=self.config.integration.transient_periods)
+        periods = whole_number("periods", periods, least=1)
+        # An exact method may take too few steps to sample a motion.
+        steps = sampled_steps(self.config, self._steps)
+        transient = self.config.integration.transient_periods
+        motion = self._moved(steps, periods, transient, self._start(None))
         values = motion.states[:-1, self.states.index(state)]
-        return spectral_lines(values, self._steps)
+        return spectral_lines(values, steps)
 
     def stability_limit(self) -> int:
         """Return the smallest number of steps per mesh period for a stable integration.

@@ -11,7 +11,7 @@ from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration
 from gearchaos.models.registry import system_of
-from gearchaos.outputs.names import REALISATION, axis_name
+from gearchaos.outputs.names import CONVERTED, REALISATION, axis_name
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.results.reading.result import Result
@@ -49,6 +49,11 @@ def _stored(result: Result, name: str) -> Configuration:
 
 def _as_computed(config: Configuration, result: Result, name: str) -> Configuration:
     """Return the configuration in a result with what is fixed, and with what was computed."""
+    if CONVERTED in result.metadata:
+        raise ConfigurationError(
+            f"{name}: is in physical units, and lanes are computed from dimensionless numbers; use "
+            "the result as it was before Result.physical or --units physical"
+        )
     if config.control is not None:
         raise ConfigurationError(
             f"{name}: is a sweep with [control], whose lanes are not recomputed one by one; "

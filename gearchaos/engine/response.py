@@ -85,15 +85,22 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
 
 
 def _with_samples(run: RunPlan) -> RunPlan:
-    """Return a run with enough steps for curves, unless the configuration gives their number.
-
-    The default of an exact method is too few for them.
-    """
-    plan, given = run.plan, run.config.integration.steps_per_period
-    if given is not None or not METHODS[plan.method].exact:
+    """Return a run with enough steps for curves."""
+    steps = sampled_steps(run.config, run.plan.steps_per_period)
+    if steps == run.plan.steps_per_period:
         return run
-    steps = plan.steps_per_period * -(-FEWEST_SAMPLES // plan.steps_per_period)
-    return run.with_choice(Chosen(steps, plan.transient_periods), "")
+    return run.with_choice(Chosen(steps, run.plan.transient_periods), "")
+
+
+def sampled_steps(config: Configuration, steps: int) -> int:
+    """Return the steps per period that curves and spectra need, a multiple of those taken.
+
+    The default of an exact method is too few for them. A number in the configuration is kept.
+    """
+    integration = config.integration
+    if integration.steps_per_period is not None or not METHODS[integration.method].exact:
+        return steps
+    return steps * -(-FEWEST_SAMPLES // steps)
 
 
 def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> Result:

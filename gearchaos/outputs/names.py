@@ -38,6 +38,9 @@ CROSSINGS = "crossings_per_period"
 STATUS = "status"
 MESH_PERIOD = "mesh_period"
 
+# Metadata.
+CONVERTED = "units"
+
 
 def rate_of(coordinate: str) -> str:
     """Return the name of the rate of a coordinate such as ``delta_5``."""

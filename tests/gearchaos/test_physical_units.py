@@ -133,6 +133,14 @@ def test_one_variable_is_enough_and_twice_is_once(result):
     assert unit_of(again, "section_delta_5_rate") == "m/s"
 
 
+def test_lanes_are_not_computed_from_converted_numbers(result, tmp_path):
+    converted = result.physical()
+    converted.save(tmp_path / "converted.h5")
+    for one in (converted, gearchaos.open_result(tmp_path / "converted.h5")):
+        with pytest.raises(gearchaos.ConfigurationError, match="is in physical units"):
+            gearchaos.System.of_lane(one, pitch_error=1.0)
+
+
 def test_a_figure_says_micrometres_and_keeps_the_dimensionless_one(path, capsys):
     assert plot([str(path), "--format=png"]) == 0
     assert plot([str(path), "--format=png", "--units=physical"]) == 0

@@ -105,3 +105,41 @@ def test_an_orbit_and_its_multipliers_are_those_of_flow_maps():
     assert np.sort(np.abs(one.multipliers)) == pytest.approx(
         np.sort(np.abs(other.multipliers)), abs=1e-9
     )
+
+
+def test_a_spectrum_is_sampled_finely_enough_by_default():
+    def amplitudes(*settings):
+        system = gearchaos.System(
+            gearchaos.load_config(MASSES, ["integration.method='taylor'", *settings]),
+            frequency=0.66,
+        )
+        return system.spectrum("x1", periods=4).amplitude[:21:4]
+
+    fine = amplitudes("integration.steps_per_period=960")
+    assert fine[1] > 0.9
+    assert amplitudes() == pytest.approx(fine, abs=3e-4)
+
+
+def test_an_element_that_weakens_another_one_does_not_hide_a_fast_motion():
+    # Alone the first element is ten times stiffer than with the second, which takes back its force.
+    stop = {"gap": {"x": 1.0}, "stiffness": 1000.0, "one_sided": True}
+    limited = {"reaction": {"x": -1.0}, "half_clearance": 0.9}
+    machine = {
+        "model": {
+            "kind": "linear",
+            "coordinates": ["x"],
+            "mass": [1.0],
+            "stiffness": [1.0],
+            "damping": [0.3],
+        },
+        "clearance": {"first": stop | {"half_clearance": 0.5}, "second": stop | limited},
+        "force": {"drive": {"on": {"x": 1.0}, "amplitude": 30.0}},
+        "sweep": {"parameter": "frequency", "values": [0.7, 1.0, 1.6]},
+        "outputs": {"section": ["x"], "section_points": 4},
+    }
+    times = {"transient_periods": 60, "recorded_periods": 16}
+    series, maps = (
+        gearchaos.run(machine | {"integration": {"method": method, **times}})["section_x"]
+        for method in ("taylor", "flow_map")
+    )
+    assert series == pytest.approx(maps, rel=1e-9)

@@ -108,7 +108,19 @@ def test_the_state_in_contact_is_at_rest():
     ]
     for machine, state in zip(still, lanes_of(still).contact_state(), strict=True):
         z = np.concatenate([state[::2], state[1::2]])
-        assert machine.change(0.0, z, [1, 1]) == pytest.approx(0.0, abs=1e-12)
+        flanks = np.where(machine.one_sided, 1.0, np.sign(machine.gaps(0.0, z)[0]))
+        assert machine.change(0.0, z, flanks) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("load", [20.0, -20.0])
+def test_the_state_in_contact_is_on_the_flank_that_carries_the_load(load):
+    machine = replace(random_machine(3, 1, 1), force=np.array([[load, 0.0, 0.0]]))
+    (state,) = lanes_of([machine]).contact_state()
+    gap = machine.gap[0, 0] * state[0] - machine.motion[0, 0]
+    deflection = gap - np.sign(gap) * machine.half_clearance[0]
+    assert gap * deflection > 0.0
+    push = machine.reaction[0, 0] * machine.stiffness[0, 0] * deflection
+    assert machine.position[0, 0] * state[0] + push == pytest.approx(load, rel=1e-12)
 
 
 @settings(max_examples=6)

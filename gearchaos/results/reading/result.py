@@ -18,6 +18,7 @@ from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 from gearchaos.outputs.names import (
+    CONVERTED,
     MESH_PERIOD,
     SECTION,
     SECTION_POINT,
@@ -337,7 +338,9 @@ class Result:
             changed[TIME] = in_seconds(changed[TIME], changed[MESH_PERIOD])
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
-        facts = self.parameters, self.metadata, self.fixed_axes
+        # Lanes are computed from dimensionless numbers, and not from converted ones.
+        metadata = {**self.metadata, CONVERTED: "physical"} if changed else self.metadata
+        facts = self.parameters, metadata, self.fixed_axes
         return Result(self.axes, [*variables.values()], data, *facts)
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:

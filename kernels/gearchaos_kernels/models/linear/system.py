@@ -202,15 +202,29 @@ class LinearSystems(LaneSystem):
 
         It is the largest natural frequency, plus the largest rate of damping, plus that of the
         highest harmonic. It is at least twice the latter, as harmonics of stiffness and of
-        excitation multiply. Branches are those with all elements in contact at their stiffest, and
-        with none: springs to the ground may be negative.
+        excitation multiply.
         """
-        springs = self.reaction * self._stiffest()[:, np.newaxis]
-        dampers = self.reaction * self.damping[:, np.newaxis]
-        frequency = _largest_eigenvalues(self.position, self.position + springs @ self.gap)
-        decay = _largest_eigenvalues(self.rate, self.rate + dampers @ self.gap)
+        frequency = self._fastest(self.position, self._stiffest())
+        decay = self._fastest(self.rate, self.damping)
         harmonic = self.harmonics() * self.frequency
         return np.maximum(np.sqrt(frequency) + decay, harmonic) + harmonic
+
+    def _fastest(self, free: Floats, strengths: Floats) -> Floats:
+        """Return a bound on the eigenvalues of a matrix with any of the elements in contact.
+
+        ``free``: the matrix without elements, (lanes, n, n); ``strengths``: stiffnesses or
+        dampings of the elements at most, (lanes, elements).
+        """
+        # More contact is stiffer: all elements, or none if springs to the ground are negative.
+        pushes = self.reaction * strengths[:, np.newaxis]
+        extreme = _largest_eigenvalues(free, free + pushes @ self.gap)
+        # An element that pushes elsewhere than it is pressed may be faster without another one.
+        sizes = np.linalg.norm(self.reaction, axis=1) * np.linalg.norm(self.gap, axis=2)
+        bound = np.linalg.norm(free, axis=(1, 2)) + np.sum(strengths * sizes, axis=1)
+        coupling = self.gap @ self.reaction
+        aside = np.abs(coupling - coupling.swapaxes(1, 2)).max(axis=(1, 2), initial=0.0)
+        alike = aside <= 1e-9 * np.abs(coupling).max(axis=(1, 2), initial=0.0)
+        return np.where(alike, extreme, bound)
 
     def _stiffest(self) -> Floats:
         """Return an upper bound of the stiffness of each element, shape (lanes, elements)."""
@@ -225,15 +239,26 @@ class LinearSystems(LaneSystem):
         return np.stack([*contact, np.zeros_like(spread)] if self.clearance else contact)
 
     def contact_state(self) -> Floats:
-        """Return the state at rest under the mean forces with all elements in contact."""
-        mean = self.stiffness[:, :, 0]
+        """Return the state at rest under the mean forces with all elements in contact.
+
+        Each is in contact on the flank to which the forces press it without clearance.
+        """
+        mean, moved = self.stiffness[:, :, 0], self.motion[:, :, 0]
         pull = self.reaction * mean[:, np.newaxis]
-        # In contact on the driving flank the deflection is the gap less the half clearance.
-        held = self.half_clearance + self.motion[:, :, 0]
-        force = self.force[:, :, 0] + np.einsum("lnm,lm->ln", pull, held)
+        matrices, forces = self.position + pull @ self.gap, self.force[:, :, 0]
+
+        def at_rest(held: Floats) -> Floats:
+            pushes = forces + np.einsum("lnm,lm->ln", pull, held + moved)
+            return np.array(
+                [np.linalg.lstsq(*one)[0] for one in zip(matrices, pushes, strict=True)]
+            ).reshape(forces.shape)
+
+        tight = at_rest(np.zeros_like(moved))
+        gaps = np.einsum("lmn,ln->lm", self.gap, tight) - moved
+        pressed_back = gaps < -1e-9 * np.abs(gaps).max(axis=1, initial=0.0)[:, np.newaxis]
+        back = pressed_back & ~np.array(self.one_sided or [False] * gaps.shape[1])
         state = np.zeros((self.lanes, len(self.states)))
-        for lane, matrix in enumerate(self.position + pull @ self.gap):
-            state[lane, ::2] = np.linalg.lstsq(matrix, force[lane])[0]
+        state[:, ::2] = at_rest(np.where(back, -self.half_clearance, self.half_clearance))
         return state
 
     def tables(self, steps_per_period: int) -> Floats:
