@@ -16,7 +16,7 @@ phase_on_grid = from_python(forcing.phase_on_grid)
 phase_within = from_python(forcing.phase_within)
 
 ROUNDING = 1e-14
-FEW_STEPS = [8, 9, 12, 16]
+FEW_STEPS = [1, 2, 3, 4, 8, 9, 12, 16]
 STEPS = [*FEW_STEPS, 31, 100, 288, 1600, 20_000]
 FRACTIONS = np.concatenate([[0.0, 0.25, 0.5, 0.75, 1.0], np.linspace(0.0, 1.0, 37)[1:-1]])
 
@@ -35,10 +35,10 @@ def variation(cosine, sine, angle) -> float:
 
 
 def some_steps(steps: int) -> list[int]:
-    return sorted({0, 1, steps // 3, steps // 2, steps - 2, steps - 1})
+    return sorted({0, 1 % steps, steps // 3, steps // 2, max(steps - 2, 0), steps - 1})
 
 
-@pytest.mark.parametrize("harmonics", [0, 1, 6, 13, 30])
+@pytest.mark.parametrize("harmonics", [0, 1, 6, 13, 30, 200])
 @pytest.mark.parametrize("steps", STEPS)
 def test_the_mesh_phase_within_a_step_is_that_of_the_trigonometric_functions(steps, harmonics):
     cosine, sine = series(harmonics)
@@ -54,22 +54,6 @@ def test_the_mesh_phase_within_a_step_is_that_of_the_trigonometric_functions(ste
             assert abs(point.slope - math.cos(angle)) < ROUNDING
 
 
-@pytest.mark.parametrize("steps", [2, 3, 4, 6])
-def test_with_a_handful_of_steps_a_period_the_phase_is_still_far_better_than_the_step(steps):
-    cosine, sine = series(6)
-    table = phase_table(cosine, sine, steps)
-    furthest = 0.5 * math.pi / steps
-    # The first terms that the series of sine and cosine leave out.
-    left_out = furthest**11 / math.factorial(11) + furthest**12 / math.factorial(12)
-    for number in range(steps):
-        for fraction in FRACTIONS:
-            angle = 2.0 * math.pi * (number + fraction) / steps
-            point = phase_within(table, number, fraction)
-            assert abs(point.variation - variation(cosine, sine, angle)) < 10.0 * ROUNDING
-            assert abs(point.value - math.sin(angle)) < ROUNDING + left_out
-            assert abs(point.slope - math.cos(angle)) < ROUNDING + left_out
-
-
 @pytest.mark.parametrize("steps", STEPS)
 def test_on_the_grid_the_phase_within_a_step_is_the_row_of_the_table(steps):
     table = phase_table(*series(6), steps)
@@ -83,14 +67,6 @@ def test_the_last_row_is_the_first_bit_for_bit():
     table = phase_table(*series(6), 77)
     assert np.array_equal(table[0], table[-1])
     assert table.shape[0] == 2 * 77 + 1
-
-
-def test_the_table_is_no_wider_than_its_series_needs():
-    # Its first columns are read in every step: they must stay in the first-level cache.
-    assert phase_table(*series(6), 200).shape[1] < 12
-    assert phase_table(*series(0), 200).shape[1] < 5
-    widths = [phase_table(*series(6), steps).shape[1] for steps in STEPS]
-    assert widths == sorted(widths, reverse=True)
 
 
 ALL, NOTHING = scene_with(True), scene_with(None)

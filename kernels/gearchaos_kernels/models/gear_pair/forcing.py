@@ -31,10 +31,9 @@ if TYPE_CHECKING:
     from gearchaos_kernels.models.gear_pair.pairs import GearPairs
 
 SINE, COSINE, VARIATION = 0, 1, 2
-"""Columns of the table; from `VARIATION` on the Taylor coefficients of the stiffness variation."""
+"""Columns of the table; after the stiffness variation its harmonics, two columns for each."""
 
-_SERIES_ERROR = 1e-15
-_MOST_TERMS = 40
+_HARMONICS = VARIATION + 1
 
 
 class Phase(NamedTuple):
@@ -71,22 +70,17 @@ def phase_table(
     """Return sine, cosine and stiffness variation at every half step of a mesh period.
 
     ``cosine``, ``sine``: Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
-    The shape is (2 steps + 1, 2 + terms); the last row repeats the first. The terms are the Taylor
-    coefficients of the variation by the mesh phase. Their number is chosen such that the series is
-    exact to rounding halfway to the next row.
+    The shape is (2 steps + 1, 3 + 2 harmonics); the last row repeats the first. A harmonic is the
+    real part of a wave, whose real and imaginary part follow the variation.
     """
     angle = half_step_angles(steps_per_period)
     order = np.arange(1, len(cosine) + 1)
     amplitude = np.array(cosine) - 1j * np.array(sine)
-    reach = order * np.pi / (2 * steps_per_period)
     waves = amplitude * np.exp(1j * np.outer(angle, order))
-    coefficients = [np.sum(waves.real, axis=1)]
-    for term in range(1, _MOST_TERMS):
-        waves = waves * 1j * order / term
-        coefficients.append(np.sum(waves.real, axis=1))
-        if np.sum(np.abs(amplitude) * reach**term) < _SERIES_ERROR * math.factorial(term):
-            break
-    return np.column_stack([sine_and_cosine(angle), *coefficients])
+    parts = np.stack([waves.real, waves.imag], axis=2).reshape(angle.size, -1)
+    # Added one after the other, as between the rows.
+    variation = np.cumsum(waves.real, axis=1)[:, -1:] if order.size else np.zeros((angle.size, 1))
+    return np.column_stack([sine_and_cosine(angle), variation, parts])
 
 
 def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
@@ -152,11 +146,14 @@ def phase_on_grid(table, row):
 
 @scalar
 def phase_within(table, number, fraction):
-    """Return the mesh phase at a fraction of a step, from the series about the nearest row."""
+    """Return the mesh phase at a fraction of a step, from the nearest row."""
     row, angle = nearest_row(number, fraction, table.shape[0])
-    variation = 0.0
-    for term in range(table.shape[1] - 1, VARIATION - 1, -1):
-        variation = variation * angle + table[row, term]
+    along, across = math.cos(angle), math.sin(angle)
+    real, imaginary, variation = along, across, 0.0
+    for column in range(_HARMONICS, table.shape[1], 2):
+        # Each wave turns by its order times the angle.
+        variation += table[row, column] * real - table[row, column + 1] * imaginary
+        real, imaginary = real * along - imaginary * across, real * across + imaginary * along
     sine, cosine = turned(table[row, SINE], table[row, COSINE], angle)
     return Phase(variation, sine, cosine, -sine)
 
