@@ -25,7 +25,7 @@ from gearchaos.engine.resonances import resonances
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.store_filling import Shard
 from gearchaos.outputs.names import DIRECTION, START
-from gearchaos.progress import notice
+from gearchaos.progress import count_of, notice
 from gearchaos.results.files.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.files.result_file import CACHE_BYTES
 
@@ -120,7 +120,7 @@ def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
     unused = f" (no requested output needs {unused})" if unused else ""
     of_all = "" if estimate.lanes == estimate.every else f" of {estimate.every}"
-    threads = f"{estimate.threads} thread{'s' if estimate.threads > 1 else ''}"
+    threads = count_of(estimate.threads, "thread")
     controllers = lanes.controllers
     controlled = {"control": controllers.described()} if controllers else {}
     return {

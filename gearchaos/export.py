@@ -58,7 +58,7 @@ class ExportOptions(NamedTuple):
 
 def _export(options: ExportOptions) -> None:
     from gearchaos.figures.response import is_response
-    from gearchaos.progress import say
+    from gearchaos.progress import count_of, say
     from gearchaos.results.files.atomic_file import check_output, replacing
     from gearchaos.results.reading.physical_units import in_units
     from gearchaos.results.reading.result import open_result
@@ -90,7 +90,7 @@ def _export(options: ExportOptions) -> None:
                 needed("pyarrow")
                 frame.to_parquet(partial, engine="pyarrow")
             rows, columns = frame.shape
-            say(f"{rows} row{'s' if rows != 1 else ''} of {columns} columns and {_index(frame)}")
+            say(f"{count_of(rows, 'row')} of {columns} columns and {_index(frame)}")
     print(options.output, flush=True)
 
 

@@ -510,7 +510,7 @@ def _lanes_in_words(result: "Result") -> str:
     from gearchaos.figures.lanes import swept_axes
 
     lanes = result.along(result.axis).size
-    words = f"{lanes} lane{'s' if lanes != 1 else ''} over {' and '.join(swept_axes(result))}"
+    words = f"{count_of(lanes, 'lane')} over {' and '.join(swept_axes(result))}"
     words += f" at {result.where}" if result.fixed else ""
     diverged = int((result["status"] != 0).sum())
     return f"{words}, {diverged} of them diverged" if diverged else words

@@ -24,6 +24,7 @@ from gearchaos.options import (
     Threads,
     placed_coordinates,
 )
+from gearchaos.progress import count_of
 
 if TYPE_CHECKING:
     from gearchaos.models import Configuration
@@ -96,7 +97,7 @@ def _respond(options: ResponseOptions) -> int:
     diverged, lanes = int((result["status"] != 0).sum()), len(run.lanes)
     fast = " or too fast" if METHODS[run.plan.method].shares_maps else ""
     text = (
-        f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
+        f"{count_of(lanes, 'lane')} over {' by '.join(result.axes)}, "
         f"{periods} periods of {run.plan.steps_per_period} steps, "
         f"{diverged} diverged{fast}"
     )

@@ -24,7 +24,7 @@ from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration
-from gearchaos.progress import notice, say
+from gearchaos.progress import count_of, notice, say
 from gearchaos.version import Software, software_version
 
 BLOCKS_PER_WORKER = 2
@@ -69,7 +69,7 @@ class DaskExecutor(ExitStack):
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
             self.callback(stack.pop_all().close)
-        say(f"{workers} dask worker{'s' if workers > 1 else ''} at {address}")
+        say(f"{count_of(workers, 'dask worker')} at {address}")
 
     def count_workers(self) -> int:
         """Return the number of workers of the cluster; wait if there is none."""
