@@ -274,7 +274,7 @@ def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
     _require_supported(scene, plan, states)
     elements = provider_of(scene.model).elements(scene.model)
     kept, loads = plan.history_periods, scene.recorders.loads
-    in_contact = elements if scene.recorders.contact else 0
+    in_contact = elements if plan.contact and scene.resolved else 0
     total = plan.transient_periods + plan.recorded_periods
     return Outcome(
         # The threads write every element, so zero-filling would be wasted.

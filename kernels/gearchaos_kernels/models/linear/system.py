@@ -190,12 +190,18 @@ class LinearSystems(LaneSystem):
 
     def growth_rates(self) -> Floats:
         """Return a bound on the rate of tangent vectors: of the stiffest branch, and of damping."""
-        engaged = self.reaction * self._stiffest()[:, np.newaxis]
-        springs = np.abs(self.position).sum(axis=2) + np.abs(engaged @ self.gap).sum(axis=2)
-        dampers = np.abs(self.rate).sum(axis=2)
-        dampers += np.abs((self.reaction * self.damping[:, np.newaxis]) @ self.gap).sum(axis=2)
-        rates: Floats = np.sqrt(springs.max(axis=1)) + dampers.max(axis=1)
-        return rates
+        springs = self._largest_row_sum(self.position, self._stiffest())
+        return np.sqrt(springs) + self._largest_row_sum(self.rate, self.damping)
+
+    def _largest_row_sum(self, free: Floats, strengths: Floats) -> Floats:
+        """Return a bound on a matrix with any of the elements in contact; see `_fastest`.
+
+        Magnitudes are taken of every element alone: together, elements could cancel.
+        """
+        pushes = np.abs(self.reaction) * strengths[:, np.newaxis]
+        sums = np.abs(free).sum(axis=2) + (pushes @ np.abs(self.gap)).sum(axis=2)
+        largest: Floats = sums.max(axis=1)
+        return largest
 
     def fastest_rates(self) -> Floats:
         """Return the rate of the fastest motion: of its branches, and of the excitation.
