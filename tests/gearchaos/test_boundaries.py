@@ -304,7 +304,7 @@ def test_each_kind_has_a_line_of_its_own(found):
         (("boundaries", "missing.h5"), ("missing.h5",)),
         (("boundaries", "map.h5"), ("map_boundaries.h5", "exists", "--overwrite")),
         (("boundaries", "map.h5", "--periods", "0"), ("--periods", "must be between 1 and 16")),
-        (("boundaries", "map.h5", "--lines", "0"), ("--lines", "must be between 1 and 1000")),
+        (("boundaries", "map.h5", "--lines", "1001"), ("--lines", "must be between 0 and 1000")),
         (
             ("boundaries", "map.h5", "-o", "new.h5", "--at", "frequency=0.55"),
             ("map.h5", "two swept parameters", "second_sweep"),

@@ -58,7 +58,7 @@ def true_section_error(sweep, arrays, name: str = "delta_5", periods: int = 6000
     every = np.arange(len(sweep.lanes))
     system = sweep.lanes.system_of(every)
     much_later = integrate(
-        system, arrays["end_state"], Plan(24, periods, 16, 16, method="flow_map")
+        system, arrays["end_state"], Plan(24, periods, 16, 16, True, method="flow_map")
     )
     orbit = much_later.section[:, :, system.states.index(name)]
     last = arrays[f"section_{name}"][:, -1:]

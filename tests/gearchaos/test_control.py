@@ -59,7 +59,7 @@ def test_the_response_is_the_difference_by_the_load():
         integrate(
             one.with_steady_input(one.steady_input + sign * h),
             orbit.point[np.newaxis],
-            Plan(12, 0, 1, 1, method="flow_map"),
+            Plan(12, 0, 1, 1, tangent=True, method="flow_map"),
         ).end_state[0]
         for sign in (1.0, -1.0)
     ]
@@ -146,7 +146,7 @@ def test_two_measured_states_are_enough_near_the_orbit():
     free = integrate(
         found.system.equations.of(np.zeros(20, dtype=int)),
         near,
-        Plan(12, 0, 400, 400, method="flow_map"),
+        Plan(12, 0, 400, 400, tangent=True, method="flow_map"),
     )
     assert np.abs(free.section[:, -1] - found.orbit.point).max() > 0.1
 

@@ -129,7 +129,7 @@ def test_the_response_is_the_difference_by_the_force(method):
     system, orbit = beyond_doubling(method)
     (response,) = Controller(system, orbit, ControlSettings(limit_absolute=0.05)).maps.responses
     h, one = 1e-6, system.actuated("drive")
-    once = Plan(STEPS[method], 0, 1, 1, method=method)
+    once = Plan(STEPS[method], 0, 1, 1, tangent=True, method=method)
     ends = [
         integrate(one.with_steady_input(np.full(1, sign * h)), orbit.point[np.newaxis], once)
         for sign in (1.0, -1.0)
@@ -147,7 +147,7 @@ def test_a_doubled_motion_returns_to_the_orbit_of_period_1(method):
     begin = found.starts(4)
     # Two excitation periods later the motion is the same, one later it is another one.
     after = system.equations.of(np.zeros(4, dtype=int))
-    section = integrate(after, begin, Plan(STEPS[method], 0, 2, 2, method=method)).section
+    section = integrate(after, begin, Plan(STEPS[method], 0, 2, 2, True, method=method)).section
     np.testing.assert_allclose(section[:, 1], begin, atol=1e-6)
     assert np.abs(section[:, 0] - begin).max() > 0.01
     motion = found.run(begin, 600)
@@ -160,7 +160,7 @@ def test_a_doubled_motion_returns_to_the_orbit_of_period_1(method):
 def test_the_motion_beyond_neimark_sacker_returns_to_an_orbit_with_two_unstable_multipliers(method):
     system, orbit = beyond_neimark_sacker(method)
     near = orbit.point + 1e-3 * np.random.default_rng(0).normal(size=(4, 4))
-    settle = Plan(STEPS[method], 2000, 50, 50, method=method)
+    settle = Plan(STEPS[method], 2000, 50, 50, tangent=True, method=method)
     free = integrate(system.equations.of(np.zeros(4, dtype=int)), near, settle)
     assert np.abs(free.section - orbit.point).max() > 0.01
     for gain in ("lqr", "placement"):

@@ -280,7 +280,7 @@ def test_dampers_that_act_in_contact_only_add_to_the_sum_in_proportion_to_the_co
     system = machines_of([random_machine(seed, 3, 2) for seed in range(6)])
     assert any(system.damped_in_contact) and np.isnan(sum_of_exponents(system)).all()
     start = 0.5 * np.random.default_rng(3).normal(size=(6, 6))
-    record = Plan(steps, 0, 4, 4, contact=True, method=method)
+    record = Plan(steps, 0, 4, 4, tangent=True, contact=True, method=method)
     outcome = integrate(system, start, record)
     shares = contact_shares(outcome, record)
     assert ((shares > 0.1) & (shares < 0.9)).any(axis=0).all() and outcome.crossings.sum() > 20

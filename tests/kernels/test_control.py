@@ -45,7 +45,9 @@ def controlled(lanes: int, points: int = 1) -> Control:
 def test_each_input_is_what_the_gain_demands(method: str, steps: int) -> None:
     system, control = oscillators(9), controlled(9, points=3)
     start = np.zeros((9, 2))
-    outcome = integrate(system.controlled(control), start, Plan(steps, 2, 18, 20, method=method))
+    outcome = integrate(
+        system.controlled(control), start, Plan(steps, 2, 18, 20, True, method=method)
+    )
     states = np.concatenate([start[:, np.newaxis], outcome.section[:, :-1]], axis=1)
     deviation = states[:, :, np.newaxis] - control.points[:, np.newaxis]
     nearest = np.argmin(np.sum(deviation**2, axis=3), axis=2)
@@ -61,12 +63,12 @@ def test_each_input_is_what_the_gain_demands(method: str, steps: int) -> None:
 def test_an_input_acts_as_a_load_of_this_size(method: str, steps: int) -> None:
     """Each mesh period by itself, with the load that the controller has chosen."""
     system, control = oscillators(5), controlled(5)
-    plan = Plan(steps, 0, 6, 6, method=method, contact=True)
+    plan = Plan(steps, 0, 6, 6, tangent=True, method=method, contact=True)
     outcome = integrate(system.controlled(control), np.zeros((5, 2)), plan)
     state = np.zeros((5, 2))
     for period in range(6):
         loaded = system.replace(load=system.load + outcome.inputs[:, period])
-        once = Plan(steps, 0, 1, 1, method=method, first_period=period)
+        once = Plan(steps, 0, 1, 1, tangent=True, method=method, first_period=period)
         state = integrate(loaded, state, once).end_state
         np.testing.assert_allclose(outcome.section[:, period], state, atol=1e-14)
 
@@ -155,7 +157,7 @@ def test_bits_do_not_depend_on_the_lanes_beside(method: str, steps: int) -> None
 
 def test_control_begins_at_its_period() -> None:
     control = controlled(4)._replace(begins=5)
-    plan = Plan(40, 0, 10, 10)
+    plan = Plan(40, 0, 10, 10, tangent=True)
     outcome = integrate(oscillators(4).controlled(control), np.zeros((4, 2)), plan)
     free = integrate(oscillators(4), np.zeros((4, 2)), plan)
     assert np.all(outcome.inputs[:, :5] == 0.0)
