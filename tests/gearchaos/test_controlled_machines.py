@@ -279,7 +279,7 @@ def test_a_sweep_of_a_planetary_set_is_controlled():
             "sweep": {"parameter": "operation.speed_rpm", "values": [2000.0, 2010.0]},
             "integration": {"method": "flow_map", "transient_periods": 300, "recorded_periods": 20},
             "control": {"limit": 0.1},
-            "outputs": {"section": ["carrier_u"], "section_points": 10, "lyapunov": False},
+            "outputs": {"section": ["carrier_u"], "section_points": 10},
         }
     )
     result = gearchaos.run(config)

@@ -55,9 +55,8 @@ def test_contact_and_crossings_are_those_of_flow_maps(size):
     system = lanes_of(machines)
     found = integrate(system, start, Plan(4, **SERIES))
     maps = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map"))
-    # Flow maps take the speed of a crossing before the last correction of its moment.
-    assert found.contact == pytest.approx(maps.contact, rel=1e-8, abs=1e-8)
-    assert found.slowest_crossing == pytest.approx(maps.slowest_crossing, rel=1e-6)
+    assert found.contact == pytest.approx(maps.contact, rel=1e-10, abs=1e-10)
+    assert found.slowest_crossing == pytest.approx(maps.slowest_crossing, rel=1e-10)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)

@@ -111,15 +111,15 @@ def refined_fall(aside, first, raised, at):
     """Return a place where a gap plus a number is zero, from the guess of a cubic.
 
     One step of Chebyshev's method removes nearly all of the error, and one of Newton's method the
-    rest. Returns the place, the last correction, and the gap before it with its slope.
+    rest. Returns the place, the last correction, the gap before it, and the slope after it.
     """
     value, slope, curvature = gap_along(aside, first, at)
     inverse = 1.0 / slope
     shift = (value + raised) * inverse
     at -= shift + shift * shift * curvature * inverse
-    value, slope, _ = gap_along(aside, first, at)
+    value, slope, bend = gap_along(aside, first, at)
     correction = (value + raised) / slope
-    return at - correction, correction, value, slope
+    return at - correction, correction, value, slope - 2.0 * bend * correction
 
 
 @scalar
