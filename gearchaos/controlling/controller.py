@@ -181,8 +181,7 @@ class Controller:
         lanes = self.system.equations.of(np.zeros(count, dtype=np.intp))
         shifts = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (count, len(self.scales)))
         begin = self.system.state + shifts
-        settle = Plan(plan.steps_per_period, transient, 0, 0, tangent=True, method=plan.method)
-        return kernels.integrate(lanes, begin, settle).end_state
+        return kernels.integrate(lanes, begin, plan.over(0, transient)).end_state
 
     def run(self, starts: int | Floats = 1000, periods: int = 1000) -> ControlledMotion:
         """Integrate motions with control.
@@ -207,10 +206,7 @@ class Controller:
         """
         periods = whole_number("periods", periods, least=1)
         states = self.starts(starts) if isinstance(starts, int) else np.asarray(starts, float)
-        plan = self.system.plan
-        # With a tangent: the kernel is then the one that linearised the map.
-        record = Plan(plan.steps_per_period, 0, periods, periods, tangent=True, method=plan.method)
-        outcome = self.integrate(states, record)
+        outcome = self.integrate(states, self.system.plan.over(periods))
         distance = distance_from(
             self.maps.points, outcome.section, self.scales.max(), self.system.repeats_after, 1
         )

@@ -118,8 +118,7 @@ def _attractors_of(
     ``lanes`` (tried,): numbers of the lanes; ``state`` (lanes, states) and ``period`` (lanes,): of
     all lanes.
     """
-    length = _settling_periods(system)
-    long = Plan(plan.steps_per_period, 0, length, length, tangent=True, method=plan.method)
+    long = plan.over(_settling_periods(system))
     part, n = system.of(lanes), period[lanes]
     last = integrate(part, state[lanes], long).end_state
     orbits = polish(part, last, n, plan)

@@ -86,8 +86,7 @@ class BranchRange(NamedTuple):
         ahead = WITH_OWN_MAPS if own_maps else LANES_AHEAD // (scale.size + 1)
         whole = period * self.system_at(np.zeros(1)).repeats_after
         along = only_map_parameter(self.system_at(PLACES)) if own_maps else -1
-        plan = Plan(
-            steps, 0, whole, whole, True, contact=True, method=plan.method, interpolated=along
-        )
+        plan = plan._replace(steps_per_period=steps).over(whole)
+        plan = plan._replace(contact=True, interpolated=along)
         ahead = min(max(ahead, 1), MOST_AHEAD)
         return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)

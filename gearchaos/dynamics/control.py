@@ -112,7 +112,7 @@ def _tangent_ends(system: LaneSystem, points: Floats, plan: Plan, first: int) ->
     outcome = integrate(
         system.of(np.zeros(len(starts), dtype=np.intp)).controlled(control),
         starts,
-        Plan(plan.steps_per_period, 0, 1, 1, tangent=True, method=plan.method, first_period=first),
+        plan.over(1)._replace(first_period=first),
         tangent_start=vectors,
     )
     ends = outcome.end_tangent * np.exp(outcome.growth)

@@ -82,8 +82,7 @@ class Target(NamedTuple):
         ``system``: of one lane; ``point`` (states,) at mesh phase 0; ``period`` in excitation
         periods; ``plan``: method and steps.
         """
-        whole = period * system.repeats_after
-        once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
+        once = plan.over(period * system.repeats_after)
         section = integrate(system, point[np.newaxis], once).section[0]
         points = np.vstack([point, section[:-1]])
         return cls(period_maps(system, points, plan), coordinate_scale(points[np.newaxis])[0])

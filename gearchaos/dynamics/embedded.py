@@ -57,8 +57,7 @@ def embedded_orbits(system: LaneSystem, section: Floats, period: int, plan: Plan
     periods = np.full(close.size, period, np.int32)
     found = polish(lanes, section[close], periods, plan, scale)
     closed = np.flatnonzero(found.converged)
-    whole = period * system.repeats_after
-    once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
+    once = plan.over(period * system.repeats_after)
     closed = closed[_first_of_each(system, found.points[closed], scale, once)]
     order = np.argsort(np.abs(found.multipliers[closed, 0]), kind="stable")
     return found.of(closed[order])

@@ -258,9 +258,8 @@ class _Lanes:
     def _curve(self, lane: int) -> Curve:
         """Return the curve of the orbit of a lane, without scales."""
         period = int(self._period[lane])
-        steps, method = self._plan.steps_per_period, self._plan.method
-        whole = period * self._systems(np.array([lane]), np.zeros(1)).repeats_after
-        plan = Plan(steps, 0, whole, whole, tangent=True, method=method)
+        repeats = self._systems(np.array([lane]), np.zeros(1)).repeats_after
+        plan = self._plan.over(period * repeats)
         return Curve(self._systems, lane, plan, period, np.ones(self.stable.points.shape[1]))
 
     def _systems(self, lanes: Integers, shares: Floats) -> LaneSystem:

@@ -50,10 +50,8 @@ class PeriodMaps(NamedTuple):
         Controllers act from the beginning, without noise.
         """
         system = system.controlled(system.control and system.control.settled())
-        longest = int(period.max()) * system.repeats_after
-        steps, method = plan.steps_per_period, plan.method
-        # With a tangent everywhere: maps and Jacobians share one kernel and agree bit for bit.
-        return cls(system, period, Plan(steps, 0, longest, longest, tangent=True, method=method))
+        # One compiled loop for maps and Jacobians: they agree bit for bit.
+        return cls(system, period, plan.over(int(period.max()) * system.repeats_after))
 
     def of(self, lanes: Integers) -> Self:
         """Return the maps of some lanes."""

@@ -94,8 +94,7 @@ def remainders(
 
 def _orbit_section(system: LaneSystem, orbits: Orbits, period: int, plan: Plan) -> Floats:
     """Return the section of orbits over one period, shape (lanes, period, states)."""
-    whole = period * system.repeats_after
-    once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
+    once = plan.over(period * system.repeats_after)
     points = orbits.points
     # Newton's method stops at a small distance; one more step reduces it to rounding.
     left = integrate(system, points, once).end_state - points

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import METHODS, Plan, steps_taken
+from gearchaos_kernels import METHODS, steps_taken
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
@@ -329,9 +329,9 @@ class _BoundarySearch:
     def _equations(self, period: int, kind: str, flank: int = -1) -> Equations:
         """Return the equations of a boundary."""
         usual, most = self.steps
-        whole = period * self.run.lanes.repeats_after
-        method, along = self.run.plan.method, self.interpolated
-        plan = Plan(usual, 0, whole, whole, tangent=True, method=method, interpolated=along)
+        plan = self.run.plan._replace(steps_per_period=usual)
+        plan = plan.over(period * self.run.lanes.repeats_after)
+        plan = plan._replace(interpolated=self.interpolated)
         equations = Equations(self.over.system_at, plan, period, self.scale, kind, fixed=self.fixed)
         return equations.grazing(flank, most) if kind == GRAZING else equations
 

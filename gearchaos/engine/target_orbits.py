@@ -96,10 +96,7 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
     repeats = system.repeats_after
     transient = max(-(-plan.transient_periods // repeats), LEAST_TRANSIENT) * repeats
     length = CLOSE_RETURN_RECORD * repeats
-    # With a tangent: the kernel is then that of the orbits.
-    record = kernels.Plan(
-        plan.steps_per_period, transient, length, length, tangent=True, method=plan.method
-    )
+    record = plan.over(length, transient)
     start = start_states(run.config, system, np.zeros(1, dtype=np.intp))
     outcome = kernels.integrate(system, start, record)
     found = np.zeros((0, start.shape[1]))

@@ -83,6 +83,33 @@ class Plan(NamedTuple):
     frame: bool = False
     interpolated: int = -1
 
+    def over(self, periods: int, transient: int = 0) -> Self:
+        """Return a plan with the same method and steps that records every mesh period.
+
+        It has a tangent vector, and crossings are resolved. What is computed around an orbit, such
+        as its section, its period map and its derivative, then shares one compiled loop.
+
+        Parameters
+        ----------
+        periods : int
+            Recorded mesh periods, each with a section point.
+        transient : int, optional
+            Mesh periods before them.
+
+        Returns
+        -------
+        Plan
+            The plan.
+
+        Examples
+        --------
+        >>> Plan(12, 300, 100, 20, loads=True, method="flow_map").over(3).section_points
+        3
+        """
+        return type(self)(
+            self.steps_per_period, transient, periods, periods, tangent=True, method=self.method
+        )
+
     @property
     def records_steps(self) -> bool:
         """Whether recorders read the end of every step; flow maps then take shorter steps."""
