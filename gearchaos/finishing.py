@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gearchaos.engine.run_plan import RunPlan
 
 
-WRITTEN_BY = dict.fromkeys((".png", ".pdf", ".svg"), "plot")
+WRITTEN_BY = dict.fromkeys((".png", ".pdf", ".svg", ".eps", ".jpg", ".tiff"), "plot")
 WRITTEN_BY |= dict.fromkeys((".csv", ".mat", ".parquet"), "export")
 WRITTEN_BY |= {".html": "report"}
 """Endings of files that other commands write from a result."""

@@ -51,8 +51,8 @@ def _as_computed(config: Configuration, result: Result, name: str) -> Configurat
     """Return the configuration in a result with what is fixed, and with what was computed."""
     if CONVERTED in result.metadata:
         raise ConfigurationError(
-            f"{name}: is in physical units, and lanes are computed from dimensionless numbers; use "
-            "the result as it was before Result.physical or --units physical"
+            f"{name}: {result.metadata[CONVERTED]}: is in physical units, and lanes are computed "
+            "from the values of the configuration; use the result before Result.physical"
         )
     if config.control is not None:
         raise ConfigurationError(

@@ -39,7 +39,7 @@ STATUS = "status"
 MESH_PERIOD = "mesh_period"
 
 # Metadata.
-CONVERTED = "units"
+CONVERTED = "converted_axes"
 
 
 def rate_of(coordinate: str) -> str:

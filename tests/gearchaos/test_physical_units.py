@@ -110,6 +110,11 @@ def test_a_mesh_frequency_is_in_hertz_and_no_longer_angular(tmp_path):
     assert found["mesh_frequency"] == pytest.approx(1.0 / result.parameters["mesh_period"].values)
     told = found.attributes("mesh_frequency")
     assert (told["units"], told["long_name"]) == ("Hz", "mesh frequency")
+    found.save(tmp_path / "converted.h5")
+    refused = "mesh_frequency: is in physical units"
+    for one in (found, gearchaos.open_result(tmp_path / "converted.h5")):
+        with pytest.raises(gearchaos.ConfigurationError, match=refused):
+            gearchaos.System.of_lane(one, mesh_frequency=0.0)
 
 
 def test_accelerations_are_the_rates_of_the_speeds(path):
@@ -133,12 +138,11 @@ def test_one_variable_is_enough_and_twice_is_once(result):
     assert unit_of(again, "section_delta_5_rate") == "m/s"
 
 
-def test_lanes_are_not_computed_from_converted_numbers(result, tmp_path):
-    converted = result.physical()
-    converted.save(tmp_path / "converted.h5")
-    for one in (converted, gearchaos.open_result(tmp_path / "converted.h5")):
-        with pytest.raises(gearchaos.ConfigurationError, match="is in physical units"):
-            gearchaos.System.of_lane(one, pitch_error=1.0)
+def test_lanes_of_a_converted_result_are_computed_where_its_axes_are_as_configured(result):
+    lane = {"pitch_error": float(result["pitch_error"][1])}
+    one, other = (gearchaos.System.of_lane(given, **lane) for given in (result, result.physical()))
+    assert np.array_equal(one.state, other.state)
+    assert one.mesh_period == other.mesh_period
 
 
 def test_a_figure_says_micrometres_and_keeps_the_dimensionless_one(path, capsys):

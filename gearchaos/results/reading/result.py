@@ -338,8 +338,10 @@ class Result:
             changed[TIME] = in_seconds(changed[TIME], changed[MESH_PERIOD])
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
-        # Lanes are computed from dimensionless numbers, and not from converted ones.
-        metadata = {**self.metadata, CONVERTED: "physical"} if changed else self.metadata
+        metadata = self.metadata
+        if axes := [n for n in self.axes if variables[n].units != self.variables[n].units]:
+            # Lanes cannot be computed again from them.
+            metadata = {**metadata, CONVERTED: " ".join(axes)}
         facts = self.parameters, metadata, self.fixed_axes
         return Result(self.axes, [*variables.values()], data, *facts)
 
