@@ -8,13 +8,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from select import select
 from tempfile import TemporaryDirectory, mkdtemp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -111,6 +111,30 @@ def small_config(folder: Path) -> Path:
     path = folder / "gears.toml"
     path.write_text(SMALL, encoding="utf-8")
     return path
+
+
+@contextmanager
+def served(folder: Path, *words: str, stderr: Any = None) -> Iterator[str]:
+    """Serve a page as a user does, in a process of its own; yield its address.
+
+    The process ends with the block, however that ends: waiting for it would otherwise never end.
+    """
+    command = [sys.executable, "-m", "gearchaos.explore", *words, "--no-browser", "--port=0"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=stderr, text=True) as server:
+        try:
+            assert server.stdout is not None
+            yield server.stdout.readline().strip()
+        finally:
+            server.terminate()
+
+
+def until(page: Any, met: Callable[[], bool]) -> None:
+    """Wait until a page shows something that no locator describes."""
+    end = time.monotonic() + PAGE_HANGS
+    while not met():
+        assert time.monotonic() < end
+        page.wait_for_timeout(50.0)
 
 
 def run_module(

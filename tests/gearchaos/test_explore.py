@@ -26,7 +26,7 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explore import PORTS, _free_port, main
 
-from .commands import PAGE_HANGS, small_config
+from .commands import PAGE_HANGS, served, small_config
 
 # Not imported: every process collects all files, and one of them runs this one.
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
@@ -82,16 +82,12 @@ def path(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def address(path):
     """Serve the file as a user does, for all tests, and remove it: what was opened stays."""
-    served = path.parent / "served" / path.name
-    served.parent.mkdir()
-    shutil.copy(path, served)
-    command = [sys.executable, "-m", "gearchaos.explore", "pair.h5", "--no-browser", "--port", "0"]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, cwd=served.parent, stdout=pipe, text=True) as server:
-        address = server.stdout.readline().strip()
-        served.unlink()
+    copy = path.parent / "served" / path.name
+    copy.parent.mkdir()
+    shutil.copy(path, copy)
+    with served(copy.parent, "pair.h5") as address:
+        copy.unlink()
         yield address
-        server.terminate()
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,6 @@
 
 import shlex
 import shutil
-import subprocess
-import sys
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,7 +18,7 @@ from gearchaos.figures.ensembles import COLORS
 from gearchaos.figures.style import VERMILION
 from gearchaos.results.reading.result import Result
 
-from .commands import PAGE_HANGS, small_config
+from .commands import PAGE_HANGS, served, small_config
 
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"without {', '.join(missing)}")
@@ -170,25 +168,21 @@ def browser():
 
 
 @contextmanager
-def served(browser, folder: Path, file: str, link: str):
+def opened(browser, folder: Path, file: str, link: str):
     """Serve a file as a user does, and open a link to its page."""
-    command = [sys.executable, "-m", "gearchaos.explore", file, "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            page = browser.new_page(viewport={"width": 1200, "height": 900})
-            page.set_default_timeout(1000.0 * PAGE_HANGS)
-            page.goto(server.stdout.readline().strip() + link)
-            page.locator(".bk-Figure >> nth=4").wait_for()
-            page.locator("pre:has-text('mesh_force')").wait_for()
-            yield page
-            page.close()
-        finally:
-            server.terminate()
+    with served(folder, file) as address:
+        page = browser.new_page(viewport={"width": 1200, "height": 900})
+        page.set_default_timeout(1000.0 * PAGE_HANGS)
+        page.goto(address + link)
+        page.locator(".bk-Figure >> nth=4").wait_for()
+        page.locator("pre:has-text('mesh_force')").wait_for()
+        yield page
+        page.close()
 
 
 @pytest.fixture(scope="module")
 def page(folder, browser):
-    with served(browser, folder, "plane.h5", "?units=dimensionless") as page:
+    with opened(browser, folder, "plane.h5", "?units=dimensionless") as page:
         yield page
 
 
@@ -247,7 +241,7 @@ def test_a_link_to_units_that_a_pair_lacks_is_refused_and_clicks_work(browser, p
     variables = list(plane.variables.values())
     pure = Result(plane.axes, variables, {n: plane[n] for n in plane}, known, plane.metadata)
     pure.save(folder / "pure.h5")
-    with served(browser, folder, "pure.h5", "?units=physical") as page:
+    with opened(browser, folder, "pure.h5", "?units=physical") as page:
         page.get_by_text("does not give the length_scale").wait_for()
         page.wait_for_url("**units=dimensionless*")
         # Below the message, the page is as without it.

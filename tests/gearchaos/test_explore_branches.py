@@ -1,8 +1,6 @@
 """Branches and boundaries in the explorer: what a page draws, its switch, and what is refused."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,7 +21,7 @@ from gearchaos.records.branch import (
 from gearchaos.results.files.boundary_file import BoundarySet, write_boundaries
 from gearchaos.results.files.branch_file import BranchSet, write_branches
 
-from .commands import PAGE_HANGS, run_module, small_config
+from .commands import PAGE_HANGS, run_module, served, small_config, until
 from .test_explore import ASKED, CHROMIUM, OPTIONS, needs_browser
 
 pytestmark = pytest.mark.skipif(find_spec("bokeh") is None, reason="without bokeh")
@@ -171,13 +169,8 @@ def test_a_saved_map_draws_boundaries(folder):
 def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
     from playwright.sync_api import sync_playwright
 
-    words = ["sweep.h5", "--branches", "branches.h5", "--no-browser", "--port=0"]
-    command, wrong = [sys.executable, "-m", "gearchaos.explore", *words], []
-    with (
-        subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server,
-        sync_playwright() as driver,
-    ):
-        address = server.stdout.readline().strip()
+    words, wrong = ["sweep.h5", "--branches", "branches.h5"], []
+    with served(folder, *words) as address, sync_playwright() as driver:
         page = driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split()).new_page()
         page.set_default_timeout(1000.0 * PAGE_HANGS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -189,7 +182,8 @@ def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
         page.locator("input[type=checkbox]").uncheck()
         page.wait_for_url("**/?*branches=false*")
         page.get_by_text("unstable orbits").wait_for(state="detached")
-        assert not any(one[0] for one in dashed_and_solid(page))
+        # The legend may be gone before the lines are.
+        until(page, lambda: not any(one[0] for one in dashed_and_solid(page)))
         assert "--branches" not in page.locator("pre").inner_text()
         link = page.url
         page.goto("about:blank")
@@ -201,7 +195,6 @@ def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
         page.locator("input[type=checkbox]").check()
         page.locator("select").filter(has_text="physical").select_option("physical")
         page.get_by_text("branches are drawn in dimensionless units only").wait_for()
-        server.terminate()
     assert wrong == []
 
 

@@ -1,7 +1,5 @@
 """The page of a machine: its coordinates, its elements, and the motion of a lane."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,7 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explorer.text import plain_text
 
-from .commands import PAGE_HANGS
+from .commands import PAGE_HANGS, served
 from .test_explore import CHROMIUM, OPTIONS, PERIODS, look, missing
 
 MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
@@ -47,17 +45,12 @@ def test_the_page_of_a_machine_shows_the_motion_of_a_lane(tmp_path):
 
     config = gearchaos.load_config(MASSES, SHORT)
     gearchaos.run(config).save(tmp_path / "masses.h5")
-    command = [sys.executable, "-m", "gearchaos.explore", "masses.h5", "--no-browser", "--port=0"]
-    pipe, wrong = subprocess.PIPE, []
-    with (
-        subprocess.Popen(command, cwd=tmp_path, stdout=pipe, text=True) as server,
-        sync_playwright() as driver,
-    ):
+    wrong = []
+    with served(tmp_path, "masses.h5") as address, sync_playwright() as driver:
         page = driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split()).new_page()
         page.set_default_timeout(1000.0 * PAGE_HANGS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
-        shown = look(page, server.stdout.readline().strip(), "?frequency=0.7")
-        server.terminate()
+        shown = look(page, address, "?frequency=0.7")
     assert wrong == []
     lane = gearchaos.open_result(tmp_path / "masses.h5").sel("nearest", frequency=0.7)
     given = continued(lane, "masses.h5", "end")

@@ -1,7 +1,5 @@
 """Every entry of every menu of the page, for each kind of result, in a real browser."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,7 @@ from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import VERMILION
 
-from .commands import small_config
+from .commands import served, small_config
 from .test_explore import CHROMIUM, OPTIONS, missing
 
 pytestmark = [
@@ -66,28 +64,22 @@ def saved(kind: str, folder: Path) -> Path:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
     path = saved(kind, tmp_path)
-    command = [sys.executable, "-m", "gearchaos.explore", path.name, "--no-browser", "--port", "0"]
     with (
         (tmp_path / "said").open("w+") as said,
-        subprocess.Popen(
-            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=said, text=True
-        ) as server,
+        served(tmp_path, path.name, stderr=said) as address,
     ):
-        try:
-            page = browser.new_page(viewport={"width": 800, "height": 600})
-            page.set_default_timeout(AT_MOST)
-            page.goto(f"{server.stdout.readline().strip()}?units=dimensionless")
-            # A chart, and the four panels of the motion.
-            page.locator(".bk-Figure >> nth=4").wait_for()
-            page.locator("pre:has-text('response')").wait_for()
-            result = gearchaos.open_result(path)
-            seen = entries_drawn(page, result)
-            # The spectrum of teeth with errors of their own has orders of their shaft.
-            below = page.evaluate(BELOW)
-            assert ("Order of the driving shaft (mesh: 21)" in below) == (kind == "grades")
-            page.close()
-        finally:
-            server.terminate()
+        page = browser.new_page(viewport={"width": 800, "height": 600})
+        page.set_default_timeout(AT_MOST)
+        page.goto(f"{address}?units=dimensionless")
+        # A chart, and the four panels of the motion.
+        page.locator(".bk-Figure >> nth=4").wait_for()
+        page.locator("pre:has-text('response')").wait_for()
+        result = gearchaos.open_result(path)
+        seen = entries_drawn(page, result)
+        # The spectrum of teeth with errors of their own has orders of their shaft.
+        below = page.evaluate(BELOW)
+        assert ("Order of the driving shaft (mesh: 21)" in below) == (kind == "grades")
+        page.close()
     assert "Traceback" not in (tmp_path / "said").read_text()
     assert {"section_delta_5", "lyapunov_exponent"} & {*seen}
     assert ("amplitude_transmission_error" in seen) == (kind == "diagram")
