@@ -24,7 +24,7 @@ from numba import config, types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.cache import cache_folder, keep_compiled
-from gearchaos_kernels.compiler import PartCompiler
+from gearchaos_kernels.compiler import PARTS, PartCompiler
 from gearchaos_kernels.turns import in_turn
 
 # Private parts of Numba. In a version without them, kernels compile or run more slowly.
@@ -91,6 +91,8 @@ def _decorate(function: Callable[..., Any], *, how: dict[str, Any], **optional: 
         dispatcher.get_call_template = lambda args, kws: template(
             tuple(map(types.unliteral, args)), kws
         )
+    if how is PART:
+        PARTS.add(dispatcher)
     return dispatcher
 
 

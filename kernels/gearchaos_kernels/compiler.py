@@ -5,6 +5,7 @@ which Numba has no public function. That is why the supported versions of Numba 
 """
 
 from typing import Any
+from weakref import WeakSet
 
 from numba.core import ir as numba_ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -13,6 +14,9 @@ from numba.core.ir_utils import get_definition, guard
 from numba.core.untyped_passes import RewriteSemanticConstants
 
 from gearchaos_kernels.scene import Interface, SceneType
+
+PARTS: "WeakSet[Any]" = WeakSet()
+"""Dispatchers of all functions that only compiled code calls."""
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -76,3 +80,22 @@ class PartCompiler(CompilerBase):  # type: ignore[misc]
         passes.add_pass_after(KnownScene, RewriteSemanticConstants)
         passes.finalize()
         return [passes]
+
+
+def forget_scenes() -> None:
+    """Drop the compiled code of functions that has been linked into a loop of its scene.
+
+    Nothing else can use it, and it takes 100 MB and more. Numba also compares the arguments of each
+    call with all signatures that a function has been compiled for, which grow in number.
+    """
+    for dispatcher in PARTS:
+        kept = []
+        for signature, compiled in dispatcher.overloads.items():
+            if any(isinstance(kind, SceneType) for kind in signature):
+                dispatcher.targetctx.remove_user_function(compiled.entry_point)
+            else:
+                kept.append(compiled)
+        if len(kept) < len(dispatcher.overloads):
+            dispatcher._reset_overloads()
+            for compiled in kept:
+                dispatcher.add_overload(compiled)

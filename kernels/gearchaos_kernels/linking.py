@@ -9,15 +9,19 @@ import gc
 from types import SimpleNamespace
 from typing import Any
 
+from llvmlite.binding import Linkage
+from numba.core.base import BaseContext
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.dispatcher import Dispatcher
 
-from gearchaos_kernels.compiler import PartCompiler
+from gearchaos_kernels.compiler import PartCompiler, forget_scenes
 
 # Used below. If Numba renamed one of these, an override would be ignored or a call would fail late;
 # naming them here fails at import.
 _ = PartCompiler._compile_core, JITCPUCodegen._library_class
 _ = JITCodeLibrary._optimize_final_module, JITCodeLibrary._finalize_final_module
 _ = JITCodeLibrary._finalize_dynamic_globals, JITCodeLibrary._ensure_finalized
+_ = Dispatcher._reset_overloads, BaseContext.remove_user_function  # type: ignore[attr-defined]
 
 
 class _LinkedOnly(JITCodeLibrary):  # type: ignore[misc]
@@ -29,8 +33,13 @@ class _LinkedOnly(JITCodeLibrary):  # type: ignore[misc]
         """Do nothing: the driver optimises this code."""
 
     def _finalize_final_module(self) -> None:
-        """Finish without making the code executable."""
+        """Finish without making the code executable; keep one copy, with all that it calls."""
         self._finalize_dynamic_globals()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        self._shared_module = self._final_module
+        self._linking_libraries.clear()
         self._finalized = True
 
     def get_pointer_to_function(self, _name: str) -> int:
@@ -55,5 +64,8 @@ class DriverCompiler(PartCompiler):
             return super()._compile_core()
         finally:
             del codegen._library_class
+            # It is linked, and would keep the code of all others alive.
+            getattr(self.state.library, "_linking_libraries", []).clear()
+            forget_scenes()
             if collecting:
                 gc.enable()
