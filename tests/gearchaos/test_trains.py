@@ -128,7 +128,7 @@ def test_numbering_the_planets_from_another_one_changes_their_names_only(teeth):
     assert machine.gap @ matrix == pytest.approx(machine.gap[order], abs=1e-14)
     # The next planet meshes later by the same share of a period, which is a shift of the time.
     shift = 2.0 * np.pi * (sun % table.planets) / table.planets
-    turned = np.exp(1j * shift * np.array(kinds.orders))
+    turned = np.exp(-1j * shift * np.array(kinds.orders))
     for name in ("contact_stiffness", "motion"):
         waves = getattr(machine, name)
         complex_waves = waves[:, 1::2] - 1j * waves[:, 2::2]
@@ -168,6 +168,74 @@ def test_a_planetary_set_can_be_purely_torsional():
     names = config.kinds_of_elements.coordinates
     assert [name for name in names if name.endswith(("_x", "_y", "_radial"))] == []
     assert len(names) == 8
+
+
+DRIVES = [
+    ("sun", "ring", "carrier"),
+    ("sun", "carrier", "ring"),
+    ("carrier", "ring", "sun"),
+    ("carrier", "sun", "ring"),
+    ("ring", "sun", "carrier"),
+    ("ring", "carrier", "sun"),
+]
+"""Driven, fixed and loaded member."""
+
+
+def driven_set(drive, torque):
+    """Return a set whose planets mesh one third of a period after each other."""
+    roles = dict(zip(("driven", "fixed", "loaded"), drive, strict=True))
+    teeth = {"sun_teeth": 28, "planet_teeth": 35, "ring_teeth": 98}
+    given = configured("planetary", {}).planetary
+    return given.model_copy(update=roles | teeth | {"torque_Nm": torque})
+
+
+@pytest.mark.parametrize("torque", [150.0, -150.0])
+@pytest.mark.parametrize("drive", DRIVES, ids="-".join)
+def test_meshes_follow_each_other_as_the_teeth_pass_the_planets(drive, torque):
+    given = driven_set(drive, torque)
+    teeth = {"sun": 28, "ring": 98, "carrier": -126}
+    # Turns per unit of time, positive in the direction in which the planets are numbered.
+    turns = {drive[0]: np.sign(torque), drive[1]: 0.0}
+    turns[drive[2]] = -sum(teeth[name] * turns[name] for name in drive[:2]) / teeth[drive[2]]
+    for number in range(3):
+        for gear, phase in zip(("sun", "ring"), planetary.mesh_phases(given, number), strict=True):
+            passing = teeth[gear] * (turns[gear] - turns["carrier"])
+            # The teeth that pass on the way from planet 1, and how long they take.
+            later = teeth[gear] * number / 3 / passing * abs(passing)
+            first = planetary.mesh_phases(given, 0)[("sun", "ring").index(gear)]
+            behind = (first - phase - later) % 1.0
+            assert min(behind, 1.0 - behind) == pytest.approx(0.0, abs=1e-9), (gear, number)
+
+
+@pytest.mark.parametrize("torque", [150.0, -150.0])
+@pytest.mark.parametrize("drive", DRIVES, ids="-".join)
+def test_the_force_of_a_loaded_mesh_pushes_the_gears_apart(drive, torque):
+    given = driven_set(drive, torque)
+    across = planetary.mesh_rows(given, 0)
+    for gear, outward in (("sun", -1.0), ("ring", 1.0)):
+        row = across[f"{gear}_planet_1"]
+        # The mesh holds the torque on its gear back.
+        force = -np.sign(planetary.torques(given)[gear]) * row[f"{gear}_x"]
+        assert outward * force == pytest.approx(np.sin(np.radians(24.6)))
+        assert force + np.sign(planetary.torques(given)[gear]) * -row["planet_1_radial"] < 1e-12
+
+
+def test_a_set_that_turns_the_other_way_moves_as_its_mirror_image():
+    ways = []
+    for torque in (150.0, -150.0):
+        config = configured("planetary", {**SHORT, "planetary.torque_Nm": torque})
+        teeth = {"sun_teeth": 28, "planet_teeth": 35, "ring_teeth": 98}
+        changed = {f"planetary.{name}": value for name, value in teeth.items()}
+        # An error of the flanks has its sign, and no mirror image.
+        changed["scene.effects"] = ["translation", "stiffness_variation", "backlash"]
+        changed["sweep"] = {"parameter": "operation.speed_rpm", "values": [1000.0, 2000.0, 2600.0]}
+        config = config.replace(changed)
+        ways.append(gearchaos.run(config))
+    for gear in ("sun", "ring"):
+        # Planets 2 and 3 of one set are 3 and 2 of the other.
+        for one, other in ((1, 1), (2, 3), (3, 2)):
+            names = f"force_rms_{gear}_planet_{one}", f"force_rms_{gear}_planet_{other}"
+            assert ways[1][names[1]] == pytest.approx(ways[0][names[0]], rel=1e-8)
 
 
 def test_mesh_frequency_follows_from_the_teeth():

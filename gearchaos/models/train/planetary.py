@@ -17,13 +17,18 @@ from gearchaos.models.train.waves import error_waves, orders_of, stiffness_waves
 
 def mesh_rate(given: Planetary) -> float:
     """Return the mesh periods per revolution of the driven member."""
+    return abs(given.sun_teeth * _turns_of_sun(given))
+
+
+def _turns_of_sun(given: Planetary) -> float:
+    """Return the turns of the sun against the carrier per turn of the driven member."""
     sun, ring = given.sun_teeth, given.ring_teeth
     # Speeds of sun, ring and carrier: sun n_s + ring n_r = (sun + ring) n_c (Willis).
-    speeds: dict[str, float] = {given.driven: 1.0, given.fixed: 0.0}
-    third = next(name for name in MEMBERS if name not in speeds)
+    speeds = dict.fromkeys(MEMBERS, 0.0) | {given.driven: 1.0}
+    third = next(name for name in MEMBERS if name not in (given.driven, given.fixed))
     weights = {"sun": sun, "ring": ring, "carrier": -(sun + ring)}
     speeds[third] = -sum(weights[name] * speeds[name] for name in speeds) / weights[third]
-    return abs(sun * (speeds["sun"] - speeds["carrier"]))
+    return speeds["sun"] - speeds["carrier"]
 
 
 def torques(given: Planetary) -> dict[str, float]:
@@ -118,9 +123,14 @@ def _add_planet(parts: Assembly, given: Planetary, number: int, translates: bool
 
 
 def mesh_rows(given: Planetary, number: int) -> dict[str, dict[str, float]]:
-    """Return the rows of the meshes of a planet with sun and ring, by the names of the meshes."""
+    """Return the rows of the meshes of a planet with sun and ring, by the names of the meshes.
+
+    The line of action is that of the flanks which carry the load: their force parts the gears.
+    """
     one, angle = f"planet_{number + 1}", 2.0 * math.pi * number / given.planets
     alpha = math.radians(given.pressure_angle_deg)
+    if torques(given)["sun"] < 0.0:
+        alpha = -alpha
     sine, cosine = math.sin(alpha), math.cos(alpha)
     rows = {}
     for gear, side in (("sun", -1.0), ("ring", 1.0)):
@@ -139,13 +149,16 @@ def mesh_rows(given: Planetary, number: int) -> dict[str, dict[str, float]]:
 def mesh_phases(given: Planetary, number: int) -> tuple[float, float]:
     """Return the phases of the meshes of a planet with sun and ring, in mesh periods.
 
-    They are those of Parker and Lin (2004): a planet that is an angle further on meshes the sun
-    earlier and the ring later, by the teeth within this angle. Where the planet has an even number
-    of teeth, its meshes with sun and ring are half a period apart.
+    They are those of Parker and Lin (2004). The planets are numbered in the direction in which
+    rotations are positive. If the sun turns this way, seen from the carrier, its teeth reach a
+    later planet later, by the teeth within the angle between both; the ring turns the other way,
+    and its teeth reach it earlier. The driven member turns in the direction of its torque. Where
+    the planet has an even number of teeth, its meshes with sun and ring are half a period apart.
     """
-    share = number / given.planets
+    onward = _turns_of_sun(given) * (-1.0 if given.torque_Nm < 0.0 else 1.0) > 0.0
+    share = number / given.planets * (1.0 if onward else -1.0)
     apart = 0.5 if given.planet_teeth % 2 == 0 else 0.0
-    return (given.sun_teeth * share) % 1.0, (apart - given.ring_teeth * share) % 1.0
+    return (-given.sun_teeth * share) % 1.0, (apart + given.ring_teeth * share) % 1.0
 
 
 def _add_mesh(

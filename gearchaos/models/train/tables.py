@@ -173,6 +173,7 @@ class Planetary(Table):
     fixed: Member = key("the member that does not rotate", default="ring")
     loaded: Member = key("the member that a torque holds back", default="carrier")
     torque_Nm: float = key("torque on the driven member", units="N m", example=100.0)
+    """a negative torque turns the set the other way"""
     damping_ratio: float = key("damping ratio of the bearings", default=0.02, ge=0, lt=1)
     """damping over critical damping of the bearings at their mean eigenfrequency"""
     sun: MemberTable = key("the sun")
