@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,6 +116,20 @@ def test_a_lane_that_diverged_reports_nothing_of_contact():
     np.testing.assert_array_equal(counted.apart.counts, STARTS * np.array([0, 2, 4]))
     np.testing.assert_array_equal(counted.apart.lanes, STARTS * np.array([10, 10, 9]))
     assert motion_shares(known_motions(contact=False)).apart is None
+
+
+def test_contact_is_that_of_the_teeth_where_it_was_recorded():
+    result = known_motions()
+    crossings = result.variables["crossings_per_period"]
+    shape = result["crossings_per_period"].shape
+    free, axial = np.zeros(shape), np.ones(shape)
+    # Lanes that float between the flanks all the time cross nothing.
+    free[0] = 1.0
+    times = {"time_apart_tangential": free, "time_apart_axial": axial}
+    variables = [*result.variables.values(), *(replace(crossings, name=name) for name in times)]
+    data = {name: result[name] for name in result} | times
+    counted = motion_shares(Result(result.axes, variables, data, {}, {}))
+    np.testing.assert_array_equal(counted.apart.shares, [1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("kept", [{"starts": 1}, {"pairs": 10, "starts": 3}])

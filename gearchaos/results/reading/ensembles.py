@@ -14,6 +14,9 @@ from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
 
+TIME_APART = "time_apart_"
+TEETH = "tangential"
+"""The element of a gear pair that the teeth are."""
 BOX = 5  # Starts along each side of a box of `basin_entropy`.
 
 
@@ -48,8 +51,8 @@ class MotionShares(NamedTuple):
     other : Counted
         Lanes that do not have period 1, including diverged and unresolved ones.
     apart : Counted or None
-        Lanes that lose contact, out of those that did not diverge. None if the result has no
-        crossings.
+        Lanes that lose contact, out of those that did not diverge. None if the result has neither
+        times apart (`outputs.contact`) nor crossings of clearances, which then stand for them.
     """
 
     values: Floats
@@ -111,10 +114,22 @@ def motion_shares(result: Result) -> MotionShares:
     seen = {name: counts for name, counts in found.items() if counts.any()}
     lanes = np.full(values.size, kinds.shape[1])
     other, apart = Counted(lanes - found[names[0]], lanes), None
-    if CROSSINGS in result:
-        crossings = result[CROSSINGS].reshape(kinds.shape)
-        apart = Counted(np.sum(crossings > 0.0, axis=1), np.sum(np.isfinite(crossings), axis=1))
+    sizes = _sizes_of_loss(result)
+    if sizes:
+        lost = np.max([result[name].reshape(kinds.shape) for name in sizes], axis=0)
+        apart = Counted(np.sum(lost > 0.0, axis=1), np.sum(np.isfinite(lost), axis=1))
     return MotionShares(values, tuple(seen), np.stack([*seen.values()], axis=1), other, apart)
+
+
+def _sizes_of_loss(result: Result) -> list[str]:
+    """Return the names of variables of which one is positive where a lane loses contact.
+
+    They are the times apart: of the teeth of a gear pair, which its axial clearance does not part,
+    or of all elements of a machine. Without them, crossings of any clearance count.
+    """
+    apart = [name for name in result if name.startswith(TIME_APART)]
+    teeth = [name for name in apart if name.removeprefix(TIME_APART) == TEETH]
+    return teeth or apart or [name for name in result if name == CROSSINGS]
 
 
 class Basin(NamedTuple):
