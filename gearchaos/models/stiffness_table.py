@@ -29,6 +29,7 @@ _LENGTH = "um|µm|μm|mm|m"
 _UNIT = re.compile(
     rf"(?<![A-Za-z])N *(?:/|_per_| per ) *\(? *({_LENGTH})(?:[ _/*·.]+({_LENGTH}))?\b *\)?"
 )
+_MORE = re.compile(r"[\^²³\d]|\*\*|[ _]*(?:/|per(?![A-Za-z]))")
 _DEGREES = re.compile(r"deg|°", re.IGNORECASE)
 
 
@@ -169,7 +170,8 @@ def unit_of(heading: str) -> str:
     if found is None:
         return ""
     in_brackets = heading[: found.start()].rstrip().endswith(("[", "("))
-    if in_brackets and not re.match(r" *[\])]|$", heading[found.end() :]):
+    rest = heading[found.end() :]
+    if _MORE.match(rest) or (in_brackets and not re.match(r" *[\])]|$", rest)):
         # More follows: this is another unit.
         return ""
     lengths = [one.replace("µ", "u").replace("μ", "u") for one in found.groups() if one]

@@ -73,6 +73,11 @@ def test_the_series_is_the_shortest_one_within_the_bound():
         ("c [N/(um cm)]", ""),
         ("c [N/(mm mm)]", ""),
         ("c [N/mm^2]", ""),
+        ("k_N_per_mm^2", ""),
+        ("k_N/mm²", ""),
+        ("k_N/mm2", ""),
+        ("k N/mm per mm", ""),
+        ("k_N_per_mm_per_mm", ""),
         ("k", ""),
     ],
 )
@@ -84,6 +89,16 @@ def machine(table, folder=None, **rest):
     text = (SWEEPS / "two_masses.toml").read_text()
     text = text.replace("stiffness = 100.0", f"stiffness = {{ shape = 'table', {table} }}")
     return gearchaos.Configuration.from_toml(text, "my.toml", (), folder, **rest)
+
+
+def test_a_machine_says_that_it_converts_no_unit(tmp_path):
+    phase = np.arange(24) / 24
+    for heading, told in (("k_N_per_um", True), ("k", False)):
+        text = csv_text(360.0 * phase, stiffness(phase), f"angle / deg;{heading}", ";")
+        (tmp_path / "k.csv").write_text(text.replace(".", ","))
+        config = machine("fit_error = 1e-9, file = 'k.csv'", str(tmp_path))
+        notes = " ".join(plan_run(config).notes)
+        assert ("clearance.stop.stiffness: the unit N/um is not converted" in notes) == told
 
 
 def test_a_machine_takes_a_table_and_its_result_keeps_the_file(tmp_path):

@@ -91,6 +91,11 @@ class MachineModel(Model):
         for name, _ in config:
             for path, table in tables_in(getattr(config, name), name):
                 yield note_of(path, table)
+                if name == "clearance" and table.unit not in (None, "1"):
+                    yield (
+                        f"{path}: the unit {table.unit} is not converted; a machine of kind "
+                        "linear takes all numbers as they are, in units that fit each other"
+                    )
         yield _growing(system)
 
     def loads(self, loads: Floats, system: LaneSystem) -> dict[str, Floats]:
