@@ -491,6 +491,28 @@ def test_an_inspection_sheet_is_read_as_it_comes(begin, mark, tmp_path):
     )
 
 
+@pytest.mark.parametrize("heading", ["Tooth #", "Zahn Nr.", "z", "dent"])
+def test_a_column_that_numbers_all_teeth_gives_their_order_whatever_its_heading(heading, tmp_path):
+    rows = [f"{number};{F[number - 1]:.1f}" for number in (3, 1, 5, 2, 4)]
+    (tmp_path / "sheet.csv").write_text("\n".join([f"{heading};Fp", *rows]), encoding="utf-8")
+    path = tmp_path / "gears.toml"
+    path.write_text(driving('file = "sheet.csv"', 'column = "Fp"'))
+    found = load_config(path).pitch_error.driving.cumulative_um
+    assert found == pytest.approx([round(f, 1) for f in F])
+
+
+def test_columns_that_number_the_teeth_differently_are_refused(tmp_path):
+    rows = [f"{row};{6 - row};{F[row - 1]:.1f}" for row in range(1, 6)]
+    (tmp_path / "sheet.csv").write_text("\n".join(["Nr;Zahn;Fp", *rows]), encoding="utf-8")
+    path = tmp_path / "gears.toml"
+    path.write_text(driving('file = "sheet.csv"', 'column = "Fp"'))
+    with pytest.raises(ConfigurationError, match=r"Nr, Zahn number the teeth in different orders"):
+        load_config(path)
+    path.write_text(driving('file = "sheet.csv"', 'column = "Fp"', 'tooth_column = "Zahn"'))
+    found = load_config(path).pitch_error.driving.cumulative_um
+    assert found == pytest.approx([round(f, 1) for f in reversed(F)])
+
+
 def test_what_was_understood_is_a_note_before_the_sweep():
     path = Path(__file__).resolve().parents[2] / "sweeps" / "inspection.toml"
     notes = plan_run(load_config(path)).notes

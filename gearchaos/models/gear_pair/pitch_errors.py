@@ -68,12 +68,26 @@ def _column(text: str, table: Mapping[str, Any]) -> list[float]:
     """Return the deviations in the text of an inspection sheet, in the order of the teeth."""
     name, numbers = table.get("column"), table.get("tooth_column")
     sheet = CsvText(text, decimal_comma=True, heading=name)
-    if not isinstance(numbers, str):
-        known = [one for one in sheet.headings if one.lower().rstrip(".") in TOOTH_HEADINGS]
-        numbers = known[0] if len(known) == 1 and known[0] != name else None
-    if numbers is None:
-        return sheet.column(name, "tooth")
-    return sheet.numbered_column(name, numbers, "tooth")
+    if isinstance(numbers, str):
+        return sheet.numbered_column(name, numbers, "tooth")
+    others = [one for one in sheet.headings if one != name and sheet.headings.count(one) == 1]
+    known = [one for one in others if one.lower().rstrip(".") in TOOTH_HEADINGS]
+    if len(known) == 1:
+        return sheet.numbered_column(name, known[0], "tooth")
+    orders = {one: values for one in known or others if (values := _numbered(sheet, name, one))}
+    if len({*orders.values()}) > 1:
+        rule = f"columns {', '.join(orders)} number the teeth in different orders"
+        raise ValueError(rule, "choose one of them with tooth_column")
+    return [*next(iter(orders.values()))] if orders else sheet.column(name, "tooth")
+
+
+def _numbered(sheet: CsvText, name: object, numbers: str) -> tuple[float, ...]:
+    """Return the numbers of a column in the order of another one, if that numbers all of them."""
+    try:
+        every, ordered = sheet.column(name), sheet.numbered_column(name, numbers, "tooth")
+    except ValueError:
+        return ()
+    return tuple(ordered) if 1 < len(ordered) == len(every) else ()
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
