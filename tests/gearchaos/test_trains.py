@@ -170,6 +170,8 @@ def test_a_planetary_set_can_be_purely_torsional():
     assert len(names) == 8
 
 
+LOOP = {"gears": ["pinion_1", "wheel_2"], "stiffness_N_per_um": 400.0, "contact_ratio": 1.7}
+RADII = {"parameter": "gear.pinion_1.base_radius_mm", "values": [33.8, 40.0]}
 DRIVES = [
     ("sun", "ring", "carrier"),
     ("sun", "carrier", "ring"),
@@ -278,6 +280,8 @@ def test_a_train_at_rest_carries_its_load():
         ("two_stage", "mesh.second", None, "no mesh connects output with the other shafts"),
         ("two_stage", "mesh.first.gears", ["pinion_1", "wheel"], "names wheel, which is no gear"),
         ("two_stage", "gear.wheel_1.teeth", 4801, "the meshes repeat together only after"),
+        ("two_stage", "mesh.third", LOOP, "cannot turn with the other meshes"),
+        ("two_stage", "sweep", RADII, "has its own tooth data; give normal_module_mm in place"),
         ("two_stage", "mesh.first.half_backlash_um", -1.0, "must be at least 0"),
         ("two_stage", "shaft.input.uniform", False, "nothing holds input_angle"),
         ("two_stage", "shaft.middle.mass_kg", None, "is missing for a shaft with a bearing"),

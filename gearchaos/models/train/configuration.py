@@ -168,13 +168,19 @@ def _names_exist(config: TrainConfiguration) -> Iterator[Fault]:
 
 @RULES.reads("shaft", "gear", "mesh")
 def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
-    """Meshes connect all shafts, and their excitation has a period of reasonable length."""
+    """Meshes connect all shafts, let them turn, and repeat after a reasonable time."""
     if not config.mesh or any(True for _ in _names_exist(config)):
         return
     apart = config.shaft.keys() - config.speeds().keys()
     if apart:
         rule = f"no mesh connects {', '.join(sorted(apart))} with the other shafts"
         yield Fault("mesh", rule, "add the mesh, or remove the shaft")
+        return
+    blocked = shafts.blocked_mesh(config.gear, config.mesh, config.speeds())
+    if blocked:
+        rule = "cannot turn with the other meshes: they give its gears different pitch line speeds"
+        remedy = "correct the numbers of teeth, or remove the mesh"
+        yield Fault(f"mesh.{blocked}.gears", rule, remedy, list(config.mesh[blocked].gears))
         return
     orders = config.orders()
     highest = max(config.mesh[name].kept_harmonics * order for name, order in orders.items())
@@ -203,6 +209,8 @@ def _gears_fit_each_other(config: TrainConfiguration) -> Iterator[Fault]:
         if mate := geometry.fault_of_sweep(path, config.gear, config.mesh):
             rule = f"would change one gear of a mesh, and gear.{mate} has its own tooth data"
             remedy = f"leave out normal_module_mm of gear.{mate}, which then has those of its mate"
+            if path.endswith(geometry.RADIUS):
+                remedy = "give normal_module_mm in place of base radii, and sweep that"
             yield Fault(table, rule, remedy, path)
 
 

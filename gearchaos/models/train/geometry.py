@@ -20,6 +20,8 @@ SAME_PITCH = 0.01
 _ALIKE = ("normal_module_mm", "normal_pressure_angle_deg", "helix_angle_deg")
 """Keys in which gears in mesh agree."""
 
+RADIUS = "base_radius_mm"
+
 
 class ContactRatios(NamedTuple):
     """Transverse contact ratio and overlap ratio of a mesh."""
@@ -145,13 +147,17 @@ def faults_of_mesh(path: str, mesh: Mesh, gears: Mapping[str, Gear]) -> Iterator
 
 
 def fault_of_sweep(path: str, gears: Mapping[str, Gear], meshes: Mapping[str, Mesh]) -> str:
-    """Return the gear whose own tooth data contradict a sweep of those of its mate, if any."""
+    """Return the gear whose own tooth data contradict a sweep of those of its mate, if any.
+
+    The mate of a gear with a base radius has one, too, and both have the same base pitch.
+    """
     table, _, key = path.rpartition(".")
     name = table.removeprefix("gear.")
-    if key not in _ALIKE or name not in gears:
+    if key not in (*_ALIKE, RADIUS) or name not in gears:
         return ""
     mates = {mate for mesh in meshes.values() if name in mesh.gears for mate in mesh.gears} - {name}
-    return next((mate for mate in sorted(mates) if not _has_no_size(gears[mate])), "")
+    own = [mate for mate in sorted(mates) if key == RADIUS or not _has_no_size(gears[mate])]
+    return own[0] if own else ""
 
 
 def _in_metres(millimetres: float | None) -> float | None:

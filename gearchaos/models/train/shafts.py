@@ -43,6 +43,17 @@ def speeds_of(
     return speeds
 
 
+def blocked_mesh(
+    gears: Mapping[str, Gear], meshes: Mapping[str, Mesh], speeds: Mapping[str, Fraction]
+) -> str:
+    """Return a mesh in which the teeth of both gears do not pass at the same rate, if any."""
+    for name, mesh in meshes.items():
+        one, other = (gears[gear].teeth * speeds[gears[gear].shaft] for gear in mesh.gears)
+        if one != other:
+            return name
+    return ""
+
+
 def mesh_orders(
     gears: Mapping[str, Gear], meshes: Mapping[str, Mesh], speeds: Mapping[str, Fraction]
 ) -> dict[str, int]:
