@@ -11,6 +11,8 @@ from scipy.linalg import eigh
 
 import gearchaos
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.resonances import resonances
+from gearchaos.models.registry import model_of
 from gearchaos.models.train import planetary
 from gearchaos.models.train.waves import common_orders
 
@@ -246,6 +248,18 @@ def test_mesh_frequency_follows_from_the_teeth():
     assert planetary.mesh_rate(given) == pytest.approx(27 * 99 / 126)
     held = given.model_copy(update={"fixed": "carrier", "loaded": "ring"})
     assert planetary.mesh_rate(held) == pytest.approx(27)
+
+
+def test_numbers_of_meshes_of_different_frequency_are_those_of_their_common_period():
+    model = model_of(configured("two_stage", {}))
+    assert model.catalogue.worded("impacts per mesh period") == "impacts per common mesh period"
+    config = configured("two_stage", {"sweep.count": 2})
+    found = resonances(Lanes(config))
+    # The first mesh, with 24 teeth on the driven shaft, has two periods in the common one.
+    assert found.rpm == pytest.approx(found.hertz * 60.0 / 12.0)
+    assert "common period" in found.texts["orders"]
+    one = model_of(configured("planetary", {}))
+    assert one.catalogue.worded("impacts per mesh period") == "impacts per mesh period"
 
 
 def test_meshes_of_different_frequency_repeat_after_their_common_period():

@@ -112,14 +112,19 @@ class TrainConfiguration(MachineConfiguration):
     def frequency_at(self, values: Mapping[str, float]) -> float:
         """Return the angular frequency of the excitation in rad/ms."""
         speed = values.get(self.rate, self.operation.speed_rpm)
-        order = 1 if self.planetary is not None else self.orders()[next(iter(self.mesh))]
-        return 2.0 * math.pi * self.mesh_rate() / order * speed / 60.0 * 1e-3
+        return 2.0 * math.pi * self.common_rate() * speed / 60.0 * 1e-3
 
-    def mesh_rate(self) -> float:
-        """Return the mesh periods of the first mesh in a turn of the driven member."""
+    def common_rate(self) -> float:
+        """Return the common periods of all meshes in a turn of the driven member."""
         if self.planetary is not None:
             return planetary.mesh_rate(self.planetary)
-        return float(shafts.first_mesh_rate(self.gear, self.mesh, self.speeds()))
+        rate = shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
+        return float(rate / self.orders()[next(iter(self.mesh))])
+
+    @property
+    def has_one_mesh_frequency(self) -> bool:
+        """Whether all meshes have the same frequency."""
+        return self.planetary is not None or {*self.orders().values()} == {1}
 
     def _assembled(self, values: Mapping[str, float]) -> Assembly:
         """Return the parts of the train with these values of the swept parameters."""

@@ -11,6 +11,14 @@ from gearchaos.models.protocol import Scales
 from gearchaos.models.train.configuration import TrainConfiguration
 from gearchaos.outputs.scales import Quantity
 
+COMMON_PERIOD = MappingProxyType(
+    {
+        "mesh period": "common mesh period",
+        "mesh frequency": "common mesh frequency",
+    }
+)
+"""Terms of a train whose meshes have different frequencies and repeat after that period."""
+
 
 class TrainModel(MachineModel):
     """A gear train or a planetary set; times are in ms."""
@@ -30,11 +38,18 @@ class TrainModel(MachineModel):
         }
     )
     angle = "_angle"
-    terms = MappingProxyType({})
     exciter = "mesh"
     contact_words = "mean mesh stiffness, all teeth in contact"
 
+    def __init__(self, config: TrainConfiguration) -> None:
+        super().__init__(config)
+        self.terms = MappingProxyType({})
+        if not config.has_one_mesh_frequency:
+            # The time is counted in common periods of the meshes, which are those of none of them.
+            self.terms = COMMON_PERIOD
+            self.exciter = "common period of the meshes"
+
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:
-        """Return the scales of frequency and speed; the latter is that of the first mesh."""
+        """Return the scales of frequency, and of speed: that of the common period of all meshes."""
         lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-        return Scales(np.full(lanes, 1e3), 60.0 / config.mesh_rate())
+        return Scales(np.full(lanes, 1e3), 60.0 / config.common_rate())

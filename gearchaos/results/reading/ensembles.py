@@ -52,7 +52,7 @@ class MotionShares(NamedTuple):
         Lanes that do not have period 1, including diverged and unresolved ones.
     apart : Counted or None
         Lanes that lose contact, out of those that did not diverge. None if the result has neither
-        times apart (`outputs.contact`) nor crossings of clearances, which then stand for them.
+        times apart (`outputs.contact`) nor crossings of clearances, which count without them.
     """
 
     values: Floats
@@ -122,7 +122,7 @@ def motion_shares(result: Result) -> MotionShares:
 
 
 def _sizes_of_loss(result: Result) -> list[str]:
-    """Return the names of variables of which one is positive where a lane loses contact.
+    """Return the names of variables: some value is positive where a lane loses contact.
 
     They are the times apart: of the teeth of a gear pair, which its axial clearance does not part,
     or of all elements of a machine. Without them, crossings of any clearance count.
