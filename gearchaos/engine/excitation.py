@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from gearchaos_kernels.methods.substeps import FEWEST_RECORDED
 
+from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.run_tables import DEFAULT_STEPS
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
@@ -29,8 +31,9 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
             f"periods only, more than {LONGEST_EXCITATION}; {lanes.model.shorter_excitation}"
         )
     orders = lanes.config.outputs.mesh_orders
-    # A chosen number of steps is never smaller.
-    most = (integration.fixed_steps or DEFAULT_STEPS) / 2
+    # A chosen number of steps is never smaller, and exact methods stop at more for a recorder.
+    fewest = FEWEST_RECORDED if METHODS[integration.method].exact else 1
+    most = max(integration.fixed_steps or DEFAULT_STEPS, fewest) / 2
     if unfit := [str(one) for one in orders if one >= most]:
         raise ConfigurationError(
             f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have more than two "

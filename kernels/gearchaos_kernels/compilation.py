@@ -92,7 +92,7 @@ def _decorate(function: Callable[..., Any], *, how: dict[str, Any], **optional: 
             tuple(map(types.unliteral, args)), kws
         )
     if how is PART:
-        PARTS.add(dispatcher)
+        PARTS.append(dispatcher)
     return dispatcher
 
 

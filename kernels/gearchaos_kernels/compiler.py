@@ -5,7 +5,6 @@ which Numba has no public function. That is why the supported versions of Numba 
 """
 
 from typing import Any
-from weakref import WeakSet
 
 from numba.core import ir as numba_ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -15,7 +14,7 @@ from numba.core.untyped_passes import RewriteSemanticConstants
 
 from gearchaos_kernels.scene import Interface, SceneType
 
-PARTS: "WeakSet[Any]" = WeakSet()
+PARTS: list[Any] = []
 """Dispatchers of all functions that only compiled code calls."""
 
 

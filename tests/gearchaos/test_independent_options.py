@@ -22,7 +22,7 @@ EVERYTHING = (
     *CONTACT,
     *LOADS,
     "outputs.states=['x1','x1_rate']",
-    "outputs.orders=['1/2',1]",
+    "outputs.orders=['1/2',1,2,30]",
     "outputs.exponents=true",
 )
 ROUNDING = 1e-9

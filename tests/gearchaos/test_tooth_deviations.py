@@ -501,6 +501,19 @@ def test_a_column_that_numbers_all_teeth_gives_their_order_whatever_its_heading(
     assert found == pytest.approx([round(f, 1) for f in F])
 
 
+@pytest.mark.parametrize("heading", ["Fp [mm]", "Fp (in)", "fp_mm", "Fp (µm)", "Fp [um]", "Fp_um"])
+def test_deviations_headed_in_another_unit_than_um_are_refused(heading, tmp_path):
+    rows = [f"{number};{one:.1f}" for number, one in enumerate(F)]
+    (tmp_path / "sheet.csv").write_text("\n".join([f"Nr;{heading}", *rows]), encoding="utf-8")
+    path = tmp_path / "gears.toml"
+    path.write_text(driving('file = "sheet.csv"', f'column = "{heading}"'), encoding="utf-8")
+    if heading[-3:].strip("[(_])") in ("mm", "in"):
+        with pytest.raises(ConfigurationError, match="deviations are read in um; convert"):
+            load_config(path)
+    else:
+        assert len(load_config(path).pitch_error.driving.cumulative_um) == len(F)
+
+
 def test_columns_that_number_the_teeth_differently_are_refused(tmp_path):
     rows = [f"{row};{6 - row};{F[row - 1]:.1f}" for row in range(1, 6)]
     (tmp_path / "sheet.csv").write_text("\n".join(["Nr;Zahn;Fp", *rows]), encoding="utf-8")

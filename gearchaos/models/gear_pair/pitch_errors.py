@@ -1,6 +1,7 @@
 """Pitch errors tooth by tooth, measured or drawn by a grade: their files and their rules."""
 
 import csv
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -32,6 +33,9 @@ TOOTH_HEADINGS = frozenset((*_IN_ENGLISH, *_IN_GERMAN))
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys that change the drawn gears, but no group."""
+
+_OTHER_UNIT = re.compile(r"(?:[\[(] *|_)(mm|in|inch|mil) *[\])]?$", re.IGNORECASE)
+"""The end of a heading that names a unit other than um."""
 
 _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """Largest sum of all single deviations that rounding in a list can leave."""
@@ -67,6 +71,9 @@ def with_deviation_files(
 def _column(text: str, table: Mapping[str, Any]) -> list[float]:
     """Return the deviations in the text of an inspection sheet, in the order of the teeth."""
     name, numbers = table.get("column"), table.get("tooth_column")
+    if unit := _OTHER_UNIT.search(str(name)):
+        rule = f"column {name} is headed in {unit[1]}, and deviations are read in um"
+        raise ValueError(rule, "convert the column, and name um in its heading")
     sheet = CsvText(text, decimal_comma=True, heading=name)
     if isinstance(numbers, str):
         return sheet.numbered_column(name, numbers, "tooth")

@@ -107,8 +107,8 @@ class Force(Table):
     order: int = key("order of the wave", default=1, ge=1, le=MOST_ORDER)
     phase_deg: float = key("phase of the wave", units="deg", default=0.0)
     times_frequency_squared: bool = key(default=False)
-    """whether the amplitude is multiplied by the square of the frequency, as that of an error of
-    the gears or of an imbalance is"""
+    """whether the amplitude is multiplied by the square of the frequency of order 1, as that of an
+    error of the gears or of an imbalance that turns once a period is"""
 
 
 def _named(given: Any) -> Any:
