@@ -12,6 +12,8 @@ import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
 from gearchaos_kernels.cache import KernelCache
 from gearchaos_kernels.compilation import CACHE_FOLDER, dispatcher_of
+from gearchaos_kernels.compiler import PARTS
+from gearchaos_kernels.scene import SceneType
 
 from .reference import FULL, NO_BACKLASH, TORSION, pan2021, system_of
 
@@ -182,3 +184,10 @@ def test_a_torsional_scene_has_none_of_the_arithmetic_of_the_bearings():
 def test_a_run_without_exponent_has_none_of_the_arithmetic_of_the_tangent_vector():
     plain, tangent = loop_of(FULL, False, True), loop_of(FULL, True, True)
     assert plain.per_vector() < 0.65 * tangent.per_vector()
+
+
+def test_code_that_was_linked_into_a_loop_is_not_kept():
+    loop_of(FULL, True, True)
+    kinds = [kind for one in PARTS for signature in one.overloads for kind in signature]
+    # What belongs to no scene serves other loops.
+    assert kinds and not any(isinstance(kind, SceneType) for kind in kinds)
