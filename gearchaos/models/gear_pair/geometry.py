@@ -110,7 +110,8 @@ class HelicalPair:
     def tip_radii(self) -> PairOfValues:
         """Radii r_a of the tip circles, in m.
 
-        By default r + m_n (1 + x + k), where k m_n = a - a_d - m_n (x_1 + x_2) shortens the teeth.
+        By default r + m_n (1 + x + k), where k m_n = a - a_d - m_n (x_1 + x_2) shortens the teeth;
+        without a profile shift r + m_n, at any centre distance.
         """
         if self.tip_diameters is not None:
             return self.tip_diameters[0] / 2.0, self.tip_diameters[1] / 2.0

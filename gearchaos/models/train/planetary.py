@@ -47,8 +47,7 @@ def torques(given: Planetary) -> dict[str, float]:
 def radii(given: Planetary) -> dict[str, float]:
     """Return the radius in mm at which the rotation of each member is measured.
 
-    These are the base radii; that of the carrier is the one of the centres of the planets, times
-    the cosine of the pressure angle.
+    These are the base radii, and for the carrier the radius of the centres of the planets.
     """
     per_tooth = given.sun_base_radius_mm / given.sun_teeth
     # Half of the sum of both base radii, as the equilibrium of a planet requires.
