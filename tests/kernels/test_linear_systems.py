@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Plan, Status, integrate, jacobian
 from gearchaos_kernels.methods.flow_map import on_demand, store
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.linear.system import LinearSystems
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,9 +51,13 @@ def test_the_order_is_4_where_elements_of_every_kind_cross(size):
     assert errors[1].max() < 1e-7 and growth_errors[1].max() < 1e-6
 
 
-def test_the_jacobian_is_that_of_the_matrices():
+@pytest.mark.parametrize("compiled", [False, True])
+def test_the_jacobian_is_that_of_the_matrices(compiled, monkeypatch):
     machines = [random_machine(seed, 3, 2) for seed in range(4)]
     system = lanes_of(machines)
+    if compiled:
+        # Of other models the compiled formulas are evaluated.
+        monkeypatch.setattr(LinearSystems, "branch_jacobian", LaneSystem.branch_jacobian)
     apart = np.zeros((4, 2))
     for share in (apart, apart + 1.0):
         found = jacobian(system, share)

@@ -299,6 +299,15 @@ class LaneSystem(ABC):
         strength: Floats = one - none
         return strength
 
+    def branch_jacobian(self, stiffnesses: Floats) -> Floats | None:
+        """Return what `evaluation.jacobian` returns, from matrices that are known.
+
+        None, the default: the compiled formulas of the model are evaluated. ``stiffnesses``, shape
+        (lanes, elements), are relative to the mean.
+        """
+        del stiffnesses
+        return None
+
     def refuses_series(self) -> str:
         """Return why Taylor series cannot integrate the system, or an empty text."""
         flags = self.flags()

@@ -188,6 +188,19 @@ class LinearSystems(LaneSystem):
         """Return the change of the coefficient that is the input, by an input of 1, (lanes,)."""
         return step**2
 
+    def branch_jacobian(self, stiffnesses: Floats) -> Floats:
+        """Return the Jacobian on a contact branch, shape (lanes, states, states)."""
+        held = self.stiffness[:, :, 0] * stiffnesses
+        idle = np.array(self.structure.damped_in_contact) & (stiffnesses == 0.0)
+        damped = np.where(idle, 0.0, self.damping)
+        count = self.gap.shape[2]
+        result = np.zeros((self.lanes, 2 * count, 2 * count))
+        result[:, ::2, 1::2] = np.eye(count)
+        for first, free, strengths in ((0, self.position, held), (1, self.rate, damped)):
+            pushes = self.reaction * strengths[:, np.newaxis]
+            result[:, 1::2, first::2] = -free - pushes @ self.gap
+        return result
+
     def growth_rates(self) -> Floats:
         """Return a bound on the rate of tangent vectors: of the stiffest branch, and of damping."""
         springs = self._largest_row_sum(self.position, self._stiffest())
