@@ -150,7 +150,9 @@ def _listing(
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
     for at, boundary in enumerate([] if both else boundaries or []):
         stages[at] = stages[at]._replace(end=boundary.below)
-        stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
+        # Between the lanes may lie a stage that none of them is in.
+        if boundary.label_above == stages[at + 1].label:
+            stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
     several = any(axis in REPEATS for axis in result.axes)
     return Listing(
         result,

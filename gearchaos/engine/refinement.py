@@ -165,27 +165,34 @@ def refined_jumps(
 
     ``config``: from `computable`; ``stretches``: of this result, where the directions differ.
     Without an orbit, or if the orbit continues, a jump is located between two lanes; otherwise to
-    ``width``.
+    ``width``. The label of a motion is that of the lane whose orbit is followed. Where the orbit
+    continues with the same label, the direction does not jump.
     """
     found: list[Boundary] = []
     outermost = np.array([(one.first, one.last) for one in stretches], np.intp).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)
     for way, one_way, end, step in ways:
         edges = _edges_of(one_way)
-        # The last lane may still be in its transient: take the orbit of the lane before.
-        inner = np.clip(end - step, *outermost)
         there = (end + step >= 0) & (end + step < edges.size)
         last, beyond = edges[end[there]], edges[end[there] + step]
         if not last.size:
             continue
+        # The last lane may still be in its transient: take the orbit of the lane before it.
+        inner = edges[np.clip(end - step, *outermost)[there]]
+        on_its_way = last["far"] | (inner["label"] == last["label"])
+        edge = np.where(on_its_way, inner, last)
         further = 2.0 * beyond["value"] - last["value"]
-        followed = _followed(config, edges[inner[there]], further, width)
+        followed = _followed(config, edge, further, width)
         continues = np.isin(followed.loss, NO_LOSS)
+        stays = followed.loss == StabilityLoss.STAYS_STABLE
         stable = np.where(continues, last["value"], followed.stable_value)
         lost = np.where(continues, beyond["value"], followed.beyond_value)
         for n, kind in enumerate(followed.loss):
-            loss = STABILITY_LOSS_TEXTS[kind] if last["period"][n] else ""
-            sides = (float(stable[n]), last["label"][n]), (float(lost[n]), beyond["label"][n])
+            if stays[n] and edge["label"][n] == beyond["label"][n]:
+                # The motion continues: it is the other direction that jumps here.
+                continue
+            loss = STABILITY_LOSS_TEXTS[kind] if edge["period"][n] else ""
+            sides = (float(stable[n]), edge["label"][n]), (float(lost[n]), beyond["label"][n])
             (below, one), (above, other) = sides[::step]
             multiplier = complex(followed.multiplier[n])
             found.append(Boundary(below, above, one, other, loss, multiplier, way))

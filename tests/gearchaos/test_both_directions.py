@@ -18,6 +18,8 @@ from gearchaos.results.reading.jumps import apart
 from .commands import run_module, same_data
 from .short_sweeps import PAN2021
 
+MASSES = PAN2021.with_name("two_masses.toml")
+
 STEP = 0.05
 WHERE = (
     "start.carry=both",
@@ -96,6 +98,17 @@ def test_refined_jumps_are_the_folds(folder, folds):
         assert jump["below"] - 1e-5 <= fold <= jump["above"] + 1e-5
         assert jump["loss"].startswith("fold")
         assert jump["multiplier"][0] > 0.9
+
+
+def test_a_direction_whose_motion_continues_does_not_jump():
+    sweep = "sweep={parameter='frequency',from=0.575,to=0.604166666666,count=8}"
+    result = gearchaos.run(gearchaos.load_config(MASSES, [sweep]))
+    stretches = apart(result)
+    assert stretches
+    # Upwards the motion of period 6 continues to 0.5917; downwards it changes to period 7 before.
+    for jump in refined_jumps(computable(result, "masses.h5"), result, stretches, 1e-6):
+        stays = jump.loss.startswith("the orbit stays stable")
+        assert not (stays and jump.label_below == jump.label_above), jump
 
 
 def test_the_table_reports_where_directions_differ_within_80_columns(folder):

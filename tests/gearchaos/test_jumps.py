@@ -51,6 +51,15 @@ def test_a_step_five_times_those_beside_it_is_a_jump(times, found):
     assert np.flatnonzero(jump_sizes(np.full(41, 1), section(branch))).tolist() == found
 
 
+@pytest.mark.parametrize(("times", "found"), [(4.0, []), (6.0, [0])])
+@pytest.mark.parametrize("alone", [0.0, np.nan])
+def test_the_outermost_step_is_compared_with_the_one_beside_it(times, found, alone):
+    steps = np.full(20, 0.03)
+    steps[0] *= times
+    branch = 1.0 + np.concatenate([[0.0], np.cumsum(steps)])
+    assert np.flatnonzero(jump_sizes(np.full(21, 1), section(branch), 1.0, alone)).tolist() == found
+
+
 def test_only_motions_of_the_same_period_are_compared():
     branch = np.where(VALUES > 0.5, 1.0, 0.0)
     period = np.where(VALUES > 0.5, 2, 1)

@@ -75,6 +75,10 @@ def test_boundaries_are_refined_and_the_period_doubling_is_reported(folder):
     assert doubling["multiplier"][0] == pytest.approx(-1.0, abs=0.02)
     assert facts["stages"][0]["end"] == doubling["below"]
     assert facts["stages"][1]["start"] == doubling["above"]
+    values = gearchaos.open_result(folder / "pan.h5")["pitch_error"]
+    for boundary, stage in zip(facts["boundaries"], facts["stages"][1:], strict=True):
+        alike = boundary["label_above"] == stage["label"]
+        assert stage["start"] == (boundary["above"] if alike else values[stage["first"]])
 
 
 def test_a_start_of_a_grid_is_refined_as_it_started():

@@ -157,7 +157,8 @@ def jump_sizes(
         Distances of the swept values.
     alone : float
         Distance that is assumed between lanes of different periods. With 0, two lanes without
-        comparable lanes beside them may count as a jump.
+        comparable lanes beside them may count as a jump. At the ends of the sweep only the inner
+        side is compared.
 
     Returns
     -------
@@ -168,7 +169,8 @@ def jump_sizes(
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
     apart = section_distance(section[:-1], section[1:], common)
     # fmin and fmax: beside the end of a stage, only the other side can be compared.
-    rate = np.pad(np.where(np.isnan(apart), alone, apart) / cells, 1, constant_values=alone)
+    rate = np.where(np.isnan(apart), alone, apart) / cells
+    rate = np.pad(rate, 1, constant_values=np.nan)
     one, both = (of(rate[:-2], rate[2:]) * cells for of in (np.fmin, np.fmax))
     steep = (apart > STEEPEST * one) & (apart > STEEPER * both)
     return np.where((apart > SMALLEST) & steep, apart, 0.0)
