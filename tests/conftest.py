@@ -15,7 +15,7 @@ settings.register_profile(
 settings.load_profile("repeatable")
 
 FIRST = ("vectorisation", "flow_map", "dask", "explore", "oracle", "second_model", "claims")
-FIRST += ("linear_systems", "controlled_machines", "hard_boundaries", "notebook", "explore_menus")
+FIRST += ("linear_systems", "controlled_machines", "hard_boundaries", "explore_menus")
 FIRST += (
     "fuzz",
     "sweep_interrupted",
