@@ -160,7 +160,6 @@ class BranchSearch:
                 section_points=whole,
                 # The kernel is then that of the branches.
                 tangent=True,
-                contact=True,
                 loads=False,
                 states=(),
                 orders=(),

@@ -184,11 +184,11 @@ def refined_jumps(
         further = 2.0 * beyond["value"] - last["value"]
         followed = _followed(config, edge, further, width)
         continues = np.isin(followed.loss, NO_LOSS)
-        stays = followed.loss == StabilityLoss.STAYS_STABLE
         stable = np.where(continues, last["value"], followed.stable_value)
         lost = np.where(continues, beyond["value"], followed.beyond_value)
         for n, kind in enumerate(followed.loss):
-            if stays[n] and edge["label"][n] == beyond["label"][n]:
+            alike = edge["label"][n] == beyond["label"][n]
+            if alike and kind == StabilityLoss.STAYS_STABLE:
                 # The motion continues: it is the other direction that jumps here.
                 continue
             loss = STABILITY_LOSS_TEXTS[kind] if edge["period"][n] else ""

@@ -65,7 +65,7 @@ class DriverCompiler(PartCompiler):
         finally:
             del codegen._library_class
             # It is linked, and would keep the code of all others alive.
-            getattr(self.state.library, "_linking_libraries", []).clear()
+            self.state.library._linking_libraries.clear()
             forget_scenes()
             if collecting:
                 gc.enable()

@@ -15,6 +15,7 @@ PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
 """The pair with the groups of the stored reference solutions, whose motions are well known."""
 
 SPEEDS = PAN2021.with_name("mesh_frequency.toml")
+MASSES = PAN2021.with_name("two_masses.toml")
 SOFT_BEARINGS = (
     "groups.load=0.26762",
     "groups.half_backlash=0.94518",

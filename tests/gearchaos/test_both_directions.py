@@ -16,9 +16,7 @@ from gearchaos.records.label import CHAOTIC
 from gearchaos.results.reading.jumps import apart
 
 from .commands import run_module, same_data
-from .short_sweeps import PAN2021
-
-MASSES = PAN2021.with_name("two_masses.toml")
+from .short_sweeps import MASSES, PAN2021
 
 STEP = 0.05
 WHERE = (

@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.records.control import CAPTURED, NO_ORBIT
 
 from .commands import run_module
+from .short_sweeps import MASSES
 
-MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
 PLANETARY = MASSES.with_name("planetary.toml")
 STEPS = {"flow_map": 16, "rk4": 400, "taylor": 4}
 METHODS = tuple(STEPS)

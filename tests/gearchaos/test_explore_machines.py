@@ -1,7 +1,5 @@
 """The page of a machine: its coordinates, its elements, and the motion of a lane."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,9 +9,9 @@ from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explorer.text import plain_text
 
 from .commands import PAGE_HANGS, served
+from .short_sweeps import MASSES
 from .test_explore import CHROMIUM, OPTIONS, PERIODS, look, missing
 
-MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
 SHORT = (
     "integration={method='taylor', transient_periods=200, recorded_periods=100}",
     "sweep.count=21",

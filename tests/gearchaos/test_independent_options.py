@@ -1,14 +1,14 @@
 """What a sweep finds depends neither on what else it records nor on the steps of exact methods."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gearchaos
 
-MASSES = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
+from .short_sweeps import MASSES
+
 SHORT = (
     "sweep={parameter='frequency',values=[0.6,0.62,0.63,0.645,0.66,0.8]}",
     "start.carry='none'",

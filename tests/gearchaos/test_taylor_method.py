@@ -1,7 +1,5 @@
 """Taylor series as the method of a machine, from its configuration to results."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,10 +8,9 @@ from gearchaos.engine.method_choice import for_continuation, with_method
 from gearchaos.errors import ConfigurationError
 
 from .commands import run_module
-from .short_sweeps import PAN2021
+from .short_sweeps import MASSES, PAN2021
 
-SWEEPS = Path(__file__).parents[2] / "sweeps"
-MASSES, PLANETARY = SWEEPS / "two_masses.toml", SWEEPS / "planetary.toml"
+PLANETARY = MASSES.with_name("planetary.toml")
 SHORT = (
     "integration.transient_periods=200",
     "integration.recorded_periods=100",

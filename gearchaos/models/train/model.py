@@ -38,12 +38,12 @@ class TrainModel(MachineModel):
         }
     )
     angle = "_angle"
+    terms: Mapping[str, str] = MappingProxyType({})
     exciter = "mesh"
     contact_words = "mean mesh stiffness, all teeth in contact"
 
     def __init__(self, config: TrainConfiguration) -> None:
         super().__init__(config)
-        self.terms = MappingProxyType({})
         if not config.has_one_mesh_frequency:
             # The time is counted in common periods of the meshes, which are those of none of them.
             self.terms = COMMON_PERIOD

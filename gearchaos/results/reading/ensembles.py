@@ -15,8 +15,8 @@ from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
 
 TIME_APART = "time_apart_"
-TEETH = "tangential"
-"""The element of a gear pair that the teeth are."""
+TEETH_APART = "time_apart_tangential"
+"""The time for which the teeth of a gear pair are apart."""
 BOX = 5  # Starts along each side of a box of `basin_entropy`.
 
 
@@ -127,9 +127,10 @@ def _sizes_of_loss(result: Result) -> list[str]:
     They are the times apart: of the teeth of a gear pair, which its axial clearance does not part,
     or of all elements of a machine. Without them, crossings of any clearance count.
     """
+    if TEETH_APART in result:
+        return [TEETH_APART]
     apart = [name for name in result if name.startswith(TIME_APART)]
-    teeth = [name for name in apart if name.removeprefix(TIME_APART) == TEETH]
-    return teeth or apart or [name for name in result if name == CROSSINGS]
+    return apart or ([CROSSINGS] if CROSSINGS in result else [])
 
 
 class Basin(NamedTuple):
