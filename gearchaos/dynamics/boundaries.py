@@ -4,6 +4,7 @@ The boundaries are folds, period doublings, Neimark-Sacker points and grazings o
 """
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from gearchaos.dynamics.boundary_following import (
 )
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.boundary_tests import Reference
+from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CUSP,
@@ -191,12 +193,13 @@ def tracing(equations: Equations, starts: Sequence[OnBoundary]) -> Following[lis
         The boundaries with their points of codimension 2. Those of several starts are one.
     """
     paths = yield from following(equations, starts)
-    return (yield from together([_completed(equations, one) for one in paths]))
+    return (yield from together([completed(equations, one) for one in paths]))
 
 
-def _completed(equations: Equations, path: Path) -> Following[TracedBoundary]:
+def completed(equations: Equations, path: Path) -> Following[TracedBoundary]:
     """Add the points between the points of a path that are of codimension 2, or make it smooth."""
     points = yield from _flattened(equations, path.points)
+    points = yield from _with_pairs_parted(equations, _aligned(points))
     between = yield from together(
         [_located_between(equations, one, other) for one, other in pairwise(points)]
     )
@@ -235,15 +238,64 @@ def _points_between(
     if not (aside > FLAT and length > SHORT_STEP):
         return []
     guess, direction = among_columns(equations, middle, chord / length, 0.2 * length)
-    between = yield from equations.correcting(guess, direction, one.reference)
-    if between is None or np.linalg.norm(between.place - middle) >= length / 2.0:
+    between = yield from _found_between(equations, (one, other), guess, direction)
+    if between is None:
         return []
-    onward = np.sign(between.tangent @ chord) or 1.0
-    between = between._replace(tangent=onward * between.tangent)
     before, after = yield from together(
         [_points_between(equations, *ends) for ends in ((one, between), (between, other))]
     )
     return [*before, between, *after]
+
+
+def _found_between(
+    equations: Equations, ends: tuple[OnBoundary, OnBoundary], guess: Floats, direction: Floats
+) -> Following[OnBoundary | None]:
+    """Search the point between two that lies next to a guess, as `Equations.correcting`."""
+    one, other = ends
+    chord = other.place - one.place
+    found = yield from equations.correcting(guess, direction, one.reference)
+    if found is None or np.linalg.norm(found.place - guess) >= np.linalg.norm(chord) / 2.0:
+        return None
+    onward = np.sign(found.tangent @ chord) or 1.0
+    return found._replace(tangent=onward * found.tangent)
+
+
+def _aligned(points: list[OnBoundary]) -> list[OnBoundary]:
+    """Return points with null vectors that do not change their direction along the curve."""
+    found = points[:1]
+    for point in points[1:]:
+        left, right = (
+            one * (np.sign(one @ before) or 1.0) if one.size == before.size else one
+            for one, before in zip(point.reference[:2], found[-1].reference[:2], strict=True)
+        )
+        found.append(point._replace(reference=point.reference._replace(left=left, right=right)))
+    return found
+
+
+def _with_pairs_parted(
+    equations: Equations, points: list[OnBoundary]
+) -> Following[list[OnBoundary]]:
+    """Search points that part pairs of points of codimension 2; return all points in order."""
+    tests = [_tests(equations.kind, one) for one in points]
+
+    def between(one: OnBoundary, other: OnBoundary, share: float) -> Following[OnBoundary | None]:
+        chord = other.place - one.place
+        direction = fixed_direction(equations, chord / np.linalg.norm(chord))
+        guess = cubic(one, other, np.array([share]))[0]
+        return _found_between(equations, (one, other), guess, direction)
+
+    sought = [
+        (at, name)
+        for name in TESTS[equations.kind]
+        for at in nearly_zero(points, np.array([one[name] for one in tests]))
+    ]
+    found = yield from together(
+        [
+            parting(points[at - 1 : at + 2], partial(_test, equations.kind, name), between)
+            for at, name in sought
+        ]
+    )
+    return joined_with(points, [(at, one) for (at, _), one in zip(sought, found, strict=True)])
 
 
 def _cut(
@@ -271,16 +323,26 @@ def _cut(
     return points[first : last + 1], kept
 
 
-def _tests(kind: str, point: OnBoundary, of: OnBoundary) -> dict[str, float]:
+def _test(kind: str, name: str, points: Sequence[OnBoundary]) -> Floats:
+    """Return one of the functions of `_tests` at some points, (points,)."""
+    return np.array([_tests(kind, one)[name] for one in points])
+
+
+def _tests(kind: str, point: OnBoundary) -> dict[str, float]:
     """Return the functions that change their sign at points of codimension 2 of each kind.
 
-    ``kind``: that of the boundary; ``of``: the point whose null vectors give the directions.
+    ``kind``: that of the boundary.
     """
     multipliers, found = point.multipliers, {}
+    left, right = point.reference.left, point.reference.right
     cosine = point.reference.cosine
     for name in TESTS[kind]:
-        if name in (CUSP, STRONG_RESONANCE_11, STRONG_RESONANCE_12) and kind != NEIMARK_SACKER:
-            found[name] = _null_test(name, point, of)
+        if name == CUSP:
+            # Both parameters move along the direction that the left null vector leaves.
+            across = left @ point.slopes
+            found[name] = float(point.tangent[-1] * across[0] - point.tangent[-2] * across[1])
+        elif name in (STRONG_RESONANCE_11, STRONG_RESONANCE_12) and kind != NEIMARK_SACKER:
+            found[name] = float(left @ right)
         elif name in RESONANCES or name in WEAKER_RESONANCES:
             found[name] = cosine - {**RESONANCES, **WEAKER_RESONANCES}[name]
         elif name in _WITH_PAIR:
@@ -293,22 +355,11 @@ def _tests(kind: str, point: OnBoundary, of: OnBoundary) -> dict[str, float]:
     return found
 
 
-def _null_test(name: str, point: OnBoundary, of: OnBoundary) -> float:
-    """Return the test of a cusp or of a double multiplier, from the null vectors."""
-    left = point.reference.left * (np.sign(point.reference.left @ of.reference.left) or 1.0)
-    if name == CUSP:
-        # Both parameters move along the direction that the left null vector leaves.
-        across = left @ point.slopes
-        return float(point.tangent[-1] * across[0] - point.tangent[-2] * across[1])
-    right = point.reference.right * (np.sign(point.reference.right @ of.reference.right) or 1.0)
-    return float(left @ right)
-
-
 def _located_between(
     equations: Equations, one: OnBoundary, other: OnBoundary
 ) -> Following[list[tuple[str, OnBoundary]]]:
     """Search kind and point of the points of codimension 2 between two points, in order."""
-    before, after = (_tests(equations.kind, at, one) for at in (one, other))
+    before, after = (_tests(equations.kind, at) for at in (one, other))
     names = [name for name, value in before.items() if value * after[name] < 0.0]
     points = yield from together([_located(equations, one, other, name) for name in names])
     found = []
@@ -346,7 +397,7 @@ def _located(
     length = float(np.linalg.norm(chord))
     direction = fixed_direction(equations, chord / length)
     nearest: OnBoundary | None = None
-    low, high = (_tests(equations.kind, at, one)[name] for at in (one, other))
+    low, high = _test(equations.kind, name, (one, other))
     newest, opposite, share = (1.0, high), (0.0, low), low / (low - high)
     for _ in range(MOST_TRIALS):
         least = min(0.1, LOCATED / length)
@@ -358,7 +409,7 @@ def _located(
         if middle is None:
             break
         moved = np.inf if nearest is None else np.linalg.norm(middle.place - nearest.place)
-        nearest, value = middle, _tests(equations.kind, middle, one)[name]
+        nearest, value = middle, float(_test(equations.kind, name, (middle,))[0])
         before = newest
         if (value > 0.0) == (newest[1] > 0.0):
             newest = share, value

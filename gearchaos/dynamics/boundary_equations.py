@@ -16,10 +16,10 @@ from gearchaos.dynamics.boundary_passages import (
     Following,
     Passed,
     Passing,
-    nearest_extremes,
     passed_of,
 )
 from gearchaos.dynamics.boundary_tests import CRITICAL, Reference, pairs
+from gearchaos.dynamics.gap_extremes import nearest_extremes
 from gearchaos.dynamics.orbits import CLOSED
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import GRAZING, NEIMARK_SACKER

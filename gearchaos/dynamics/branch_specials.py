@@ -21,6 +21,8 @@ import numpy as np
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, cubic
 from gearchaos.dynamics.curve_defects import Finding
+from gearchaos.dynamics.near_grazings import TestFunction, near_grazings
+from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -39,110 +41,31 @@ SHORT = 0.01
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
 
-NEAR_ZERO = 0.5
-"""Largest ratio of the extreme of a parabola through three values to the one in the middle.
-
-Where the extreme is larger, there are no two special points to part.
-"""
-
-MOST_PARTINGS = 8
-"""Largest number of points with which a point between two special points is searched."""
-
 
 def with_pairs_parted(curve: Curve, points: list[CurvePoint]) -> Finding[list[CurvePoint]]:
-    """Search points that part pairs of special points of one kind; return all points in order.
+    """Search points that part pairs of special points of one kind; return all points in order."""
+    sought = [*_multipliers_near_zero(points), *near_grazings(curve, points)]
 
-    A grazing has no test function with an amount, so pairs of them are not seen.
-    """
+    def between(one: CurvePoint, other: CurvePoint, share: float) -> Finding[CurvePoint | None]:
+        return _between(curve, one, other, share)
+
+    found = yield from together(
+        [parting(points[at - 1 : at + 2], test, between) for at, test in sought]
+    )
+    return joined_with(points, [(at, one) for (at, _), one in zip(sought, found, strict=True)])
+
+
+def _multipliers_near_zero(points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
+    """Yield the points near which a test function of the multipliers comes near to zero."""
     functions = [_test_functions(one) for one in points]
     values = np.array([[*one.values()] for one in functions])
-    places = np.array([one.place for one in points])
-    positions = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    sought = [
-        (at, kind)
-        for kind, of_kind in zip(functions[0], values.T, strict=True)
-        for at in _nearly_zero(of_kind, positions)
-    ]
-    found = yield from together(
-        [_parting(curve, points[at - 1 : at + 2], kind) for at, kind in sought]
-    )
-    parted: list[tuple[int, float, CurvePoint]] = []
-    for (at, _), one in zip(sought, found, strict=True):
-        if one is not None:
-            first = at if _along(points[at], one, points[at + 1]) > 0.0 else at - 1
-            parted.append((first, _along(points[first], one, points[first + 1]), one))
-    joined = list(points)
-    # The last ones first: the numbers of those before stay.
-    for first, _, one in sorted(parted, key=lambda it: it[:2], reverse=True):
-        joined.insert(first + 1, one)
-    return joined
+    for kind, of_kind in zip(functions[0], values.T, strict=True):
 
+        def test(some: Sequence[CurvePoint], kind: str = kind) -> Floats:
+            return np.array([_test_functions(one)[kind] for one in some])
 
-def _along(before: CurvePoint, point: CurvePoint, after: CurvePoint) -> float:
-    """Return how far a point lies on the way from one to another."""
-    return float((point.place - before.place) @ (after.place - before.place))
-
-
-def _nearly_zero(values: Floats, positions: Floats) -> list[int]:
-    """Return the points near which a test function may be zero without a change of its sign.
-
-    ``values`` and ``positions``: those of all points, (points,). There its amount is the least
-    among three points, and the parabola through them comes near to zero.
-    """
-    found = []
-    size = np.abs(values)
-    same = (values[:-2] * values[1:-1] > 0.0) & (values[1:-1] * values[2:] > 0.0)
-    least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
-    for at in (np.nonzero(same & least)[0] + 1).tolist():
-        three = slice(at - 1, at + 2)
-        extreme = _extreme(positions[three], values[three])
-        if extreme is not None and extreme[1] <= NEAR_ZERO * size[at]:
-            found.append(at)
-    return found
-
-
-def _extreme(positions: Floats, values: Floats) -> tuple[float, float] | None:
-    """Return where the parabola through three values is least in amount, and how large it is there.
-
-    It is negative if it has the other sign than the values. None if it has no such place between
-    the positions.
-    """
-    sign = np.sign(values[1])
-    bend, slope, height = np.polyfit(positions - positions[1], sign * values, 2)
-    if not bend > 0.0:
-        return None
-    at = -slope / (2.0 * bend)
-    if not positions[0] < positions[1] + at < positions[2]:
-        return None
-    return float(positions[1] + at), float(height - slope**2 / (4.0 * bend))
-
-
-def _parting(curve: Curve, three: Sequence[CurvePoint], kind: str) -> Finding[CurvePoint | None]:
-    """Search a point among three at which a test function has another sign than at them.
-
-    Each step takes the extreme of the parabola through the three points nearest to it.
-    """
-    for _ in range(MOST_PARTINGS):
-        lengths = [float(np.linalg.norm(one.place - three[1].place)) for one in three]
-        positions = np.array([-lengths[0], 0.0, lengths[2]])
-        values = np.array([_test_functions(one)[kind] for one in three])
-        extreme = _extreme(positions, values)
-        if extreme is None or extreme[1] > NEAR_ZERO * abs(values[1]) or extreme[0] == 0.0:
-            return None
-        before = extreme[0] < 0.0
-        one, other = three[:2] if before else three[1:]
-        share = (extreme[0] - (positions[0] if before else 0.0)) / (lengths[0 if before else 2])
-        new = yield from _between(curve, one, other, min(max(share, 1e-3), 1.0 - 1e-3))
-        if new is None:
-            return None
-        value = _test_functions(new)[kind]
-        if value * values[1] <= 0.0:
-            return new
-        if abs(value) > abs(values[1]):
-            three = [new, *three[1:]] if before else [*three[:2], new]
-        else:
-            three = [one, new, other]
-    return None
+        for at in nearly_zero(points, of_kind):
+            yield at, test
 
 
 def _test_functions(point: CurvePoint) -> dict[str, float]:

@@ -39,7 +39,7 @@ kind = "linear"
 coordinates = ["x"]
 mass = [1.0]
 stiffness = [0.0]
-damping = [0.1]
+damping = [{damping}]
 
 [clearance.mesh]
 gap = {{ x = 1.0 }}
@@ -68,9 +68,9 @@ count = 3
 
 
 @cache
-def spur_branch(amplitude, frequency, low, high):
+def spur_branch(amplitude, frequency, low, high, damping=0.1):
     """Return the branch of the spur pair over a range, through its motion at a frequency."""
-    text = SPUR_PAIR.format(load=EXACT["F_m"], amplitude=amplitude)
+    text = SPUR_PAIR.format(load=EXACT["F_m"], amplitude=amplitude, damping=damping)
     config = gearchaos.Configuration.from_toml(text, "spur.toml")
     system = gearchaos.System(config, frequency=frequency)
     return system.branch(system.orbit(), "frequency", low, high)
@@ -106,6 +106,20 @@ def test_the_motion_that_never_separates_grazes_where_the_linear_response_reache
     square = grazing[0] ** 2
     response = 0.02 * square / np.hypot(1.0 - square, 2.0 * zeta * grazing[0])
     assert response == pytest.approx(load, abs=1e-10)
+
+
+@pytest.mark.parametrize("frequency", (1.0, 2.0))
+@pytest.mark.parametrize("excess", (1e-8, 1e-7))
+def test_two_grazings_between_the_same_points_are_both_found(excess, frequency):
+    zeta = 0.2
+    # The linear response at resonance exceeds the distance of the flank by very little.
+    amplitude = 2.0 * zeta * np.sqrt(1.0 - zeta**2) * EXACT["F_m"] * (1.0 + excess)
+    ratio = (amplitude / EXACT["F_m"]) ** 2
+    squares = np.roots([ratio - 1.0, 2.0 - 4.0 * zeta**2, -1.0])
+    branch = spur_branch(amplitude, frequency, 0.5, 4.0, 2.0 * zeta)
+    grazing = of_kind(branch, GRAZING)
+    assert grazing == pytest.approx(sorted(np.sqrt(squares)), abs=1e-8)
+    assert 1e-5 < grazing[1] - grazing[0] < 1e-3
 
 
 def test_a_branch_does_not_depend_on_where_it_was_begun():
