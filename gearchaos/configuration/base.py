@@ -375,7 +375,11 @@ class Configuration(Tables):
 
     # Neither its source nor what was derived from it so far matters.
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Configuration) and dict(self) == dict(other)
+        return isinstance(other, Configuration) and self._fields() == other._fields()
+
+    def _fields(self) -> dict[str, Any]:
+        """Return the values of all fields by name."""
+        return {name: getattr(self, name) for name in type(self).model_fields}
 
     __hash__ = None  # type: ignore[assignment]
 

@@ -152,7 +152,7 @@ class Reproduction:
 def physical(config: Configuration) -> Mapping[str, Any]:
     """Return every key of the physical tables by its path."""
     assert isinstance(config, GearPairConfiguration)
-    return config.physical()
+    return config.physical
 
 
 def compute_gallery(

@@ -35,6 +35,12 @@ class ResolvedGroups:
             raise AttributeError(f"{name!r} is not a group")
         return self.values.get(name)
 
+    def with_given(self, given: Mapping[str, Any]) -> "ResolvedGroups":
+        """Return the groups with others in place of some that are numbers."""
+        values = {name: _as_value(value) for name, value in given.items()}
+        origin: Mapping[str, Origin] = dict.fromkeys(given, "given")
+        return ResolvedGroups({**self.values, **values}, {**self.origin, **origin})
+
     def missing(self, effects: Iterable[str]) -> list[GroupRow]:
         """Rows of the groups that a scene with these effects needs and that are unknown."""
         active = frozenset(effects)

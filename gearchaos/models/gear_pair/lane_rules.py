@@ -70,7 +70,7 @@ def _moved(config: GearPairTables, groups: ResolvedGroups, axis: int, count: int
 
 def _without_effect(config: GearPairTables, table: str, values: Floats) -> Fault:
     parameter, swept = config.sweeps[table].parameter, config.swept
-    derived = derive_groups({**config.physical(), parameter: values})
+    derived = derive_groups({**config.physical, parameter: values})
     names = [
         name for name, value in derived.items() if np.ndim(value) > GROUPS_BY_NAME[name].is_list
     ]
@@ -97,7 +97,7 @@ def _missing(config: GearPairTables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
     lacking = [
-        path for path in paths_behind(row.name, config.physical()) if _is_unknown(config, path)
+        path for path in paths_behind(row.name, config.physical) if _is_unknown(config, path)
     ]
     otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
     name = f"the {row.long_name} ({row.symbol})"
@@ -107,7 +107,7 @@ def _missing(config: GearPairTables, row: GroupRow) -> Fault:
 
 def _is_unknown(config: GearPairTables, path: str) -> bool:
     """Whether a physical key is neither given nor swept, and has no default either."""
-    field, value = PHYSICAL_KEYS[path].field, config.physical()[path]
+    field, value = PHYSICAL_KEYS[path].field, config.physical[path]
     has_default = not field.is_required() and field.default is not None
     return value is None and path not in config.swept and not has_default
 
@@ -117,7 +117,7 @@ def _out_of_range(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fa
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
             worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
-            paths = ", ".join(paths_behind(name, config.physical()))
+            paths = ", ".join(paths_behind(name, config.physical))
             rule = f"derived from {paths}, must be {row.valid.rule}"
             remedy = "check the magnitudes of those keys"
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
@@ -127,7 +127,7 @@ def _too_many_harmonics(config: GearPairTables, groups: ResolvedGroups) -> Itera
     waves = groups.values.get(HARMONICS[0], 0.0)
     if np.ndim(waves) < 2 or np.shape(waves)[-1] <= MOST_OWN_HARMONICS:
         return
-    key = "harmonics" if config.physical()["mesh.stiffness.harmonics"] else "cosine_N_per_um_mm"
+    key = "harmonics" if config.physical["mesh.stiffness.harmonics"] else "cosine_N_per_um_mm"
     swept = " or ".join(config.swept)
     rule = f"gives more than {MOST_OWN_HARMONICS} harmonics, and {swept} changes them in each lane"
     remedy = f"keep at most {MOST_OWN_HARMONICS}, or sweep another parameter"

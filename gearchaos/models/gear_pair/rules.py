@@ -33,7 +33,7 @@ def _series_are_for_machines(config: GearPairTables) -> Iterator[Fault]:
 @RULES.reads("mesh")
 def _one_damping(config: GearPairTables) -> Iterator[Fault]:
     ratio, damping = "mesh.damping_ratio", "mesh.damping_N_s_per_m"
-    swept, given = config.swept, config.physical()
+    swept, given = config.swept, config.physical
     if all(path in swept or given[path] is not None for path in (ratio, damping)):
         rule = f"{ratio} is swept" if ratio in swept else f"{ratio} = {given[ratio]} is given"
         yield Fault(damping, f"{rule} as well", "keep one of the two", given[damping])
@@ -41,7 +41,7 @@ def _one_damping(config: GearPairTables) -> Iterator[Fault]:
 
 @RULES.reads("mesh")
 def _length_scale_is_known(config: GearPairTables) -> Iterator[Fault]:
-    scale, swept, given = "mesh.length_scale_um", config.swept, config.physical()
+    scale, swept, given = "mesh.length_scale_um", config.swept, config.physical
     if given[scale] is not None or scale in swept:
         return
     rule = "is also the length scale, so that sweeping it would change the unit of every length"
@@ -58,7 +58,7 @@ def _length_scale_is_known(config: GearPairTables) -> Iterator[Fault]:
 
 @RULES.reads("mesh")
 def _one_backlash(config: GearPairTables) -> Iterator[Fault]:
-    swept, given = config.swept, config.physical()
+    swept, given = config.swept, config.physical
     first, *others = [path for path in BACKLASHES if path in swept or given[path] is not None] or [
         ""
     ]
@@ -70,14 +70,14 @@ def _one_backlash(config: GearPairTables) -> Iterator[Fault]:
 @RULES.reads("mesh", "pair")
 def _backlash_can_be_converted(config: GearPairTables) -> Iterator[Fault]:
     for path in BACKLASHES[1:]:
-        if config.pair is None and (path in config.swept or config.physical()[path] is not None):
+        if config.pair is None and (path in config.swept or config.physical[path] is not None):
             rule = "is converted by the angles of [pair], which is missing"
-            yield Fault(path, rule, f"give [pair], or {BACKLASHES[0]}", config.physical()[path])
+            yield Fault(path, rule, f"give [pair], or {BACKLASHES[0]}", config.physical[path])
 
 
 @RULES.reads("mesh")
 def _one_mean_stiffness(config: GearPairTables) -> Iterator[Fault]:
-    path, given = "mesh.mean_stiffness_N_per_um_mm", config.physical()
+    path, given = "mesh.mean_stiffness_N_per_um_mm", config.physical
     unit = given["mesh.stiffness.unit"]
     if given["mesh.stiffness.shape"] != "table":
         return
@@ -93,7 +93,7 @@ def _one_mean_stiffness(config: GearPairTables) -> Iterator[Fault]:
 
 @RULES.reads("mesh", "pair")
 def _contact_ratio_is_known(config: GearPairTables) -> Iterator[Fault]:
-    if config.pair is None and config.physical()["mesh.stiffness.shape"] == "trapezoid":
+    if config.pair is None and config.physical["mesh.stiffness.shape"] == "trapezoid":
         rule = "a trapezoid takes its shape from the contact ratio of [pair]"
         yield Fault("mesh.stiffness", rule, 'give [pair], or shape = "fourier"')
 
@@ -112,7 +112,7 @@ def _geometry_is_possible(config: GearPairTables) -> Iterator[Fault]:
     paths = {name: next(p for p in GEOMETRY if p.startswith(name)) for name in names}
     paths = {name: f"pair.{path}" for name, path in paths.items()}
     with np.errstate(all="ignore"):
-        yield from geometry_faults(Quantities(config.physical()).pair, paths)
+        yield from geometry_faults(Quantities(config.physical).pair, paths)
 
 
 def _states_exist(table: str, key: str, config: GearPairTables) -> Iterator[Fault]:

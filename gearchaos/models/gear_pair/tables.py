@@ -1,6 +1,7 @@
 """The tables of a configuration that describe a gear pair, and the groups that follow from them."""
 
 from collections.abc import Collection, Mapping
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -75,8 +76,10 @@ class PhysicalTables(Titled):
     bearings: Bearings | None = key("the bearings", default=None)
     groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
 
-    def physical(self) -> dict[str, Any]:
-        """Return every key of the physical tables by its path, with its value or None."""
+    # Searches for orbits ask for the groups at thousands of values, one after the other.
+    @cached_property
+    def physical(self) -> Mapping[str, Any]:
+        """Every key of the physical tables by its path, with its value or None."""
         return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(self.tables(PHYSICAL_TABLES))
 
 
@@ -130,6 +133,11 @@ class GearPairTables(Tables, PhysicalTables):
     start: Start = key("the state in which the lanes start", default=Start())
     outputs: Outputs = key("the kept outputs of every lane", default=Outputs())
     control: Control | None = key("a controller of every lane", default=None)
+
+    @cached_property
+    def resolved_groups(self) -> ResolvedGroups:
+        """The groups of the file, without any value of a sweep."""
+        return _resolved(self, {}, {})
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -193,17 +201,24 @@ def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> Re
     broadcast shape of the values on which it depends, as a float where on none; harmonics have one
     more axis. Raises KeyError if a parameter cannot be swept.
     """
+    for parameter in values.keys() - SWEEPABLE_GROUPS.keys():
+        if parameter not in {REALISATION, *SWEEPABLE_KEYS, *OF_CONTROLLERS}:
+            raise KeyError(parameter)
+    swept = {name: value for name, value in values.items() if name in SWEEPABLE_GROUPS}
+    if SWEEPABLE_KEYS.keys().isdisjoint(values):
+        return config.resolved_groups.with_given(swept)
+    return _resolved(config, values, swept)
+
+
+def _resolved(
+    config: GearPairTables, values: Mapping[str, npt.ArrayLike], swept: Mapping[str, npt.ArrayLike]
+) -> ResolvedGroups:
+    """Return the groups for values of parameters, of which ``swept`` are groups."""
     physical = physical_at(config, values)
-    given: dict[str, Any] = dict(config.groups.given())
     if "stiffness_variation" not in config.scene.effects:
         # Unused, so that a sweep of what they depend on need not compile formulas for them.
         physical["mesh.stiffness.shape"] = None
-    for parameter, value in values.items():
-        if parameter in SWEEPABLE_GROUPS:
-            given[parameter] = value
-        elif parameter not in {REALISATION, *SWEEPABLE_KEYS, *OF_CONTROLLERS}:
-            raise KeyError(parameter)
-    return resolve_groups(physical, given)
+    return resolve_groups(physical, {**config.groups.given(), **swept})
 
 
 def physical_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
@@ -213,4 +228,4 @@ def physical_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> 
         for parameter, value in values.items()
         if parameter in SWEEPABLE_KEYS
     }
-    return config.physical() | swept
+    return {**config.physical, **swept}
