@@ -125,8 +125,9 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     unit = "" if unit == "1" else f" [{unit}]"
     yield f"basins over {found.parameter}{unit}, {found.numbers.shape[1]} starts at each value"
     yield from where
-    if found.units:
-        yield f"exponents in {found.units.get('lyapunov_exponent', '1')}"
+    rate = found.units.get("lyapunov_exponent", "1")
+    if rate != "1":
+        yield f"exponents {rate if rate.startswith('per ') else f'in {rate}'}"
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
     yield f"{head}  {'share':>7}  95 % confidence"
     for one in found.basins:
@@ -140,7 +141,7 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     for one in found.basins if found.values.size == 1 else ():
         facts = [f"{name} {kind}" for name, kind in one.contact.items()]
         facts += [
-            f"{name} {mean:.4g} {found.units.get(name, '').removeprefix('1')}".rstrip()
+            f"{name} {mean:.4g} {'' if (unit := found.units[name]) == '1' else unit}".rstrip()
             for name, mean in one.means.items()
             if not math.isnan(mean)
         ]

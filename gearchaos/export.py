@@ -133,21 +133,25 @@ def _spectra(result: "Result") -> Any:
         spectrum_of,
     )
     from gearchaos.outputs.names import STATUS
+    from gearchaos.progress import count_of, say
     from gearchaos.results.reading.tables import needed
 
     pandas, names = needed("pandas"), response_variables_of(result)
     seconds = seconds_per_period(result)
     frequency, unit = ("frequency", "Hz") if seconds > 0.0 else ("mesh_order", "1")
-    frames = []
+    frames, windows = [], []
     for lane in np.flatnonzero(result.lanes(STATUS) == 0).tolist():
-        found = {name: spectrum_of(result, lane, name)[:2] for name in names}
-        order = found[names[0]][0]
+        found = {name: spectrum_of(result, lane, name) for name in names}
+        order, _, window = found[names[0]]
+        windows.append(window)
         places = {axis: np.full(order.size, result.along(axis)[lane]) for axis in result.axes}
         columns = {f"amplitude_{name}": found[name][1] for name in names}
         over = {frequency: order / seconds if seconds > 0.0 else order}
         frames.append(pandas.DataFrame({**places, **over, **columns}))
     if not frames:
         raise ConfigurationError("--spectrum: every lane of the response diverged")
+    for window in dict.fromkeys(windows):
+        say(f"spectrum of {count_of(windows.count(window), 'lane')}: {window}")
     frame = pandas.concat(frames).set_index([*result.axes, frequency])
     units = {axis: result.variables[axis].units for axis in result.axes} | {frequency: unit}
     units |= {f"amplitude_{name}": result.variables[name].units for name in names}

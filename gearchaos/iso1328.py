@@ -18,7 +18,7 @@ from gearchaos.errors import RangeError
 _MODULES_MM = (0.5, 2.0, 3.5, 6.0, 10.0, 16.0, 25.0, 40.0, 70.0)
 _DIAMETERS_MM = (5, 20, 50, 125, 280, 560, 1000, 1600, 2500, 4000, 6000, 8000, 10_000)
 _RANGES = {
-    1995: (range(1, 13), _MODULES_MM, _DIAMETERS_MM),
+    1995: (range(13), _MODULES_MM, _DIAMETERS_MM),
     2013: (range(1, 12), (0.5, 70.0), (5, 15_000)),
 }
 """Grades, and ends of the ranges of module and diameter; a range includes its upper end."""
@@ -76,7 +76,7 @@ def single_pitch_um(
     Parameters
     ----------
     grade : float
-        Accuracy grade, 1 to 12; 1 to 11 in the edition of 2013.
+        Accuracy grade, 0 to 12; 1 to 11 in the edition of 2013.
     normal_module_mm : float
         Normal module in mm, 0.5 to 70.
     reference_diameter_mm : float
@@ -146,7 +146,9 @@ def _limits(grade: float, module: float, diameter: float, edition: int) -> list[
         raise RangeError(f"edition {edition} of ISO 1328-1: must be 1995 or 2013")
     (grades, *ranges), sizes = _RANGES[edition], []
     if grade not in grades:
-        raise RangeError(f"grade {grade:g}: ISO 1328-1:{edition} has grades 1 to {grades[-1]}")
+        raise RangeError(
+            f"grade {grade:g}: ISO 1328-1:{edition} has grades {grades[0]} to {grades[-1]}"
+        )
     names = ("normal module", "reference diameter")
     for name, value, ends in zip(names, (module, diameter), ranges, strict=True):
         if not ends[0] <= value <= ends[-1]:

@@ -19,6 +19,7 @@ from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.ensembles import Basin, Basins, basin_entropy, in_order
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
+from gearchaos.results.reading.tables import unit_text
 
 NO_MEANS = (
     *("return_distance", "section_error", "lyapunov_sum"),
@@ -60,7 +61,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     Raises
     ------
     ConfigurationError
-        If the result has other axes.
+        If the result has other axes, or carries states along the sweep.
     FileError
         If the result has no labels, or its configuration is missing or describes other lanes.
 
@@ -72,8 +73,14 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     (1, 4)
     """
     require_labels(result, name)
-    config = computable(result, name).replace("start.carry", "none")
+    config = computable(result, name)
     swept = _swept_axes(result, name)
+    if config.start.carry != "none":
+        raise ConfigurationError(
+            f'{name}: start.carry = "{config.start.carry}": beyond the first value, lanes start '
+            "where those of the value before ended, so that their shares are no basins; sweep with "
+            'start.carry = "none"'
+        )
     choose_threads(threads)
     lanes, starts = Lanes(config), config.start.size
     shape = result.lanes("motion").size, result.variables["state"].flags
@@ -93,7 +100,9 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     grid = {str(one): np.linspace(*bounds, config.start.count) for one, bounds in box.items()}
     rows, side = numbers.reshape(-1, starts), [config.start.count] * len(box)
     entropy = [basin_entropy(row.reshape(side)) for row in rows] if grid else []
-    return Basins(result, parameter, values, rows, basins, grid, entropy)
+    named = {known.LARGEST_EXPONENT, *(name for one in basins for name in one.means)}
+    units = {n: unit_text(result.variables[n]) for n in sorted(named) if n in result.variables}
+    return Basins(result, parameter, values, rows, basins, grid, entropy, units)
 
 
 def _swept_axes(result: Result, name: str) -> list[str]:

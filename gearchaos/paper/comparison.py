@@ -184,7 +184,8 @@ def _row(
     rule, mine, difference = AGREEMENT_RULES[printed.rule], NONE, NONE
     if math.isfinite(ours):
         mine = f"{_number(ours if digits is None else round(ours, digits))} {unit}".rstrip()
-        difference = signed(ours - theirs)
+        apart = ours - theirs
+        difference = signed(apart, 2 if abs(apart) >= 0.01 else 3)
         if rule.relative:
             share = 100.0 * (ours - theirs) / abs(theirs if size is None else size)
             difference = f"{signed(share, 1 if abs(share) >= 1.0 else 3)} %"

@@ -14,7 +14,7 @@ def branch_parts(found: BranchSet) -> Parts:
     """Draw branches, and list them and their special points."""
     unit = f"[{unit_text(found.parameter)}]"
     branches, points = [], []
-    for number, one in enumerate(found.branches, start=1):
+    for number, one in enumerate(found.branches):
         ends = float(one.value.min()), float(one.value.max()), float(np.mean(one.stable))
         branches.append([number, one.period, *ends, one.value.size, *one.ends])
         points += [[number, special.kind, special.value, special.flank] for special in one.specials]
@@ -33,7 +33,7 @@ def boundary_parts(found: BoundarySet) -> Parts:
     names = [f"{one.name} [{unit_text(one)}]" for one in found.parameters]
     ends = [f"{end} of {name}" for name in names for end in ("least", "greatest")]
     curves, points = [], []
-    for number, one in enumerate(found.boundaries, start=1):
+    for number, one in enumerate(found.boundaries):
         extremes = np.stack([one.values.min(axis=0), one.values.max(axis=0)], axis=1)
         curves.append([number, one.kind, one.period, *extremes.ravel().tolist()])
         points += [[number, point.kind, *point.values.tolist()] for point in one.points]

@@ -6,14 +6,23 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+from gearchaos.progress import count_of
 from gearchaos.reporting import markup
 from gearchaos.reporting.glossary import used_in
 from gearchaos.reporting.parts import Parts, parts_of
 from gearchaos.results.files.boundary_reader import is_boundary_file, read_boundaries
 from gearchaos.results.files.branch_reader import is_branch_file, read_branches
-from gearchaos.results.reading.overview import ELSEWHERE, ERRORS, overview
+from gearchaos.results.reading.overview import (
+    ELSEWHERE,
+    ERRORS,
+    OF_THE_STEP,
+    error_spread,
+    overview,
+    span_text,
+)
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.settings import settings_of
+from gearchaos.results.reading.tables import unit_text
 
 Rows = list[Sequence[Any]]
 
@@ -24,9 +33,9 @@ def result_report(path: str, computed: Result, shown: Result) -> str:
     what: Rows = [["file", Path(path).name], ["lanes", str(summary["lanes"])]]
     for name, axis in summary["axes"].items():
         unit = "" if axis["units"] in ("", "1") else f" {axis['units']}"
-        span = f"{axis['least']:.6g} to {axis['greatest']:.6g}{unit}"
-        words = " and ".join(axis["meanings"]) or span
-        what.append([f"axis {name}", f"{axis['long_name']}, {axis['values']} values, {words}"])
+        words = " and ".join(axis["meanings"]) or f"{span_text(axis)}{unit}"
+        values = count_of(axis["values"], "value")
+        what.append([f"axis {name}", f"{axis['long_name']}, {values}, {words}"])
     for name, counts in summary["counts"].items():
         there = (f"{n} {flag.replace('_', ' ')}" for flag, n in counts.items() if n)
         what.append([name, ", ".join(there)])
@@ -35,9 +44,13 @@ def result_report(path: str, computed: Result, shown: Result) -> str:
         for name, entry in summary["parameters"].items()
     ]
     tables = {
-        "Accuracy": _accuracy(summary),
-        "Dimensionless groups": [
-            markup.table("Groups and scales", ["name", "value", "unit", "meaning", "from"], groups)
+        "Accuracy": _accuracy(shown),
+        "Parameters": [
+            markup.table(
+                "Parameters, groups and scales",
+                ["name", "value", "unit", "meaning", "from"],
+                groups,
+            )
         ]
         if groups
         else [],
@@ -99,22 +112,24 @@ def _visible(sections: Mapping[str, list[str]]) -> Iterator[str]:
             yield unescape(re.sub(r"<[^>]*>", " ", part)).replace("_", " ")
 
 
-def _accuracy(summary: Mapping[str, Any]) -> list[str]:
+def _accuracy(result: Result) -> list[str]:
     """Return the measured errors as HTML, or a sentence that none was measured."""
-    measured = {name: one for name, one in summary["errors"].items() if one["values"]}
-    parts = [markup.paragraph(f"Method: {summary['metadata'].get('method_description', '')}.")]
-    if "section_error" not in measured:
+    found = {name: result.variables[name] for name in ERRORS if name in result}
+    spreads = {name: error_spread(one, result[name]) for name, one in found.items()}
+    measured = {name: one for name, one in spreads.items() if one["values"]}
+    parts = [markup.paragraph(f"Method: {result.metadata.get('method_description', '')}.")]
+    if measured.keys().isdisjoint(OF_THE_STEP):
         parts.append(
             markup.paragraph(
                 "The error of the steps was not measured in this run; integration.error_check does."
             )
         )
     rows = [
-        [*ERRORS[name], one["values"], one["median"], one["greatest"]]
+        [*ERRORS[name], unit_text(found[name]), one["values"], one["median"], one["greatest"]]
         for name, one in measured.items()
     ]
     if rows:
-        headings = ["error", "from", "lanes [1]", "median", "greatest"]
+        headings = ["error", "from", "unit", "lanes [1]", "median [unit]", "greatest [unit]"]
         parts.append(markup.table("Measured errors", headings, rows))
     return parts
 
@@ -123,6 +138,6 @@ def _value(entry: Mapping[str, Any]) -> tuple[Any, str]:
     """Return the value of a parameter, or its range over the lanes, and its unit."""
     unit = "" if entry["units"] in ("", "1") else entry["units"]
     if "value" not in entry:
-        return f"{entry['least']:.6g} to {entry['greatest']:.6g}", unit
+        return span_text(entry), unit
     value = entry["value"]
     return (", ".join(f"{one:.6g}" for one in value) if isinstance(value, list) else value), unit

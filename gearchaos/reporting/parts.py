@@ -24,6 +24,7 @@ from gearchaos.outputs.names import DIRECTION, LABELS, REPEATS, START, STATUS, c
 from gearchaos.reporting import markup
 from gearchaos.results.reading.basin_units import physical_basins
 from gearchaos.results.reading.ensembles import Basins, motion_shares
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.jumps import apart, jumps
 from gearchaos.results.reading.listed import (
     Listed,
@@ -43,9 +44,14 @@ MOST_SLICES = 6
 
 MAP = "Map: kind of motion, largest Lyapunov exponent and contact at each pair of values"
 DIAGRAM = (
-    "Bifurcation diagram: the section of the motion at each value. One point means period 1, n "
-    "points period n, a cloud a chaotic or quasi-periodic motion. Below it, where it was computed, "
-    "the largest Lyapunov exponent, which is positive where the motion is chaotic"
+    "Bifurcation diagram: the section of the motion at each value. {points}, a cloud is a chaotic "
+    "or quasi-periodic motion. Below it, where it was computed, the largest Lyapunov exponent, "
+    "which is positive where the motion is chaotic"
+)
+ONE_POINT = "One point means period 1, n points period n"
+POINTS_OF_EXCITATION = (
+    "With period 1 it has {n} points, one for each mesh period of the excitation, with period n it "
+    "has n times as many"
 )
 SHARES = "Shares of motions among all gear pairs and starts at each value, and of contact loss"
 BASINS = "Basins of attraction: the attractor that each start leads to"
@@ -77,10 +83,17 @@ def parts_of(computed: Result, shown: Result, name: str) -> Parts:
         return _response_parts(shown)
     axes = _split_axes(computed)
     parts = Parts([], [], max(0, prod(computed[axis].size for axis in axes) - MOST_SLICES))
-    for values in islice(product(*(computed[axis].tolist() for axis in axes)), MOST_SLICES):
-        at = dict(zip(axes, values, strict=True))
-        one = shown.sel(None, **at)
-        found = _basins(computed.sel(None, **at), name)
+    if words := excitation_of(computed.metadata).in_words:
+        parts.tables.append(markup.paragraph(f"{words[0].upper()}{words[1:]}."))
+    for numbers in islice(product(*(range(computed[axis].size) for axis in axes)), MOST_SLICES):
+        # The values of an axis may have another unit in the report.
+        one, of_file = (
+            of.sel(
+                None, **{axis: of[axis][n].item() for axis, n in zip(axes, numbers, strict=True)}
+            )
+            for of in (shown, computed)
+        )
+        found = _basins(of_file, name)
         if found is not None and shown is not computed:
             found = physical_basins(found)
         where = f", {one.where}" if one.fixed else ""
@@ -149,10 +162,16 @@ def _pages(one: Result, found: Basins | None) -> Pages:
         yield SHARES, partial(shares_page, one)
     if one[one.axis].size > 1 or not several:
         stages = LABELS[0] in one and DIRECTION not in one.axes
-        yield DIAGRAM, partial(bifurcation_page, one, stages=stages)
+        yield _diagram_caption(one), partial(bifurcation_page, one, stages=stages)
         for name in _largest_loads(one):
             wording = one.variables[name].long_name
             yield f"{wording[0].upper()}{wording[1:]}", partial(bifurcation_page, one, name)
+
+
+def _diagram_caption(one: Result) -> str:
+    """Return the caption of a bifurcation diagram."""
+    n = excitation_of(one.metadata).excitation_period
+    return DIAGRAM.format(points=POINTS_OF_EXCITATION.format(n=n) if n > 1 else ONE_POINT)
 
 
 def _largest_loads(one: Result) -> list[str]:

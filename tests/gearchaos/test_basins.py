@@ -1,6 +1,7 @@
 """Basins of the two motions of period 1 that coexist in Pan 2021, and the command that tells."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gearchaos.figures import basins, basins_page, fractions
 from gearchaos.figures.ensembles import COLORS
 from gearchaos.records.label import DIVERGED, UNRESOLVED
 from gearchaos.results.reading.basin_units import physical_basins
+from gearchaos.results.reading.listed import list_basins
 from gearchaos.results.reading.result import Result
 
 from .commands import run_module
@@ -158,9 +160,12 @@ def test_the_table_lists_every_basin_within_80_columns(folder):
     ended = run(folder, "several.h5")
     assert (ended.code, ended.err) == (0, "")
     lines = ended.out.splitlines()
-    assert lines[0] == "basins over pitch_error, 16 starts at each value"
+    assert lines[:2] == [
+        "basins over pitch_error, 16 starts at each value",
+        "exponents per unit of tau",
+    ]
     assert max(map(len, lines)) <= 80
-    rows = [line.split() for line in lines[2:]]
+    rows = [line.split() for line in lines[3:]]
     assert [row[:4] for row in rows[:3]] == [
         ["0.7", "1", "period", "1"],
         ["0.9", "1", "period", "1"],
@@ -206,7 +211,8 @@ def test_physical_units_are_those_of_the_scales(tmp_path):
         json.loads(run(tmp_path, "grid.h5", "--json", *units).out)
         for units in ((), ("--units", "physical"))
     )
-    assert plain["units"] == {}
+    assert plain["units"]["lyapunov_exponent"] == "per unit of tau"
+    assert plain["units"]["time_driving_tangential"] == "1"
     units = {"delta_5": "um", "delta_5_rate": "m/s", "lyapunov_exponent": "s^-1"}
     assert units.items() <= physical["units"].items()
     factors = [25.0, 25e-6 * rate]
@@ -220,6 +226,23 @@ def test_physical_units_are_those_of_the_scales(tmp_path):
     assert page.axes[0].get_xlim() == pytest.approx((-3.0 * 37.5, 3.0 * 37.5))
     table = run(tmp_path, "grid.h5", "--csv", "--units", "physical").out
     assert "exponent [s^-1]" in table.splitlines()[0]
+
+
+def test_starts_that_are_carried_on_have_no_basins(tmp_path):
+    starts = ("start.kind=grid", "start.count=2", "start.carry=upwards")
+    computed([0.7, 0.9], *starts).save(tmp_path / "carried.h5")
+    ended = run(tmp_path, "carried.h5")
+    assert (ended.code, ended.out) == (2, "")
+    assert 'start.carry = "upwards": beyond the first value' in ended.err
+
+
+def test_units_are_those_of_the_variables(folder):
+    found = find_basins(gearchaos.open_result(folder / "grid.h5"))
+    exponent = found.result.variables["lyapunov_exponent"]
+    found.result.variables["lyapunov_exponent"] = replace(exponent, units="ms^-1")
+    again = find_basins(found.result)
+    assert again.units["lyapunov_exponent"] == "ms^-1"
+    assert "exponent [ms^-1]" in list_basins(again).headings
 
 
 def test_units_that_the_configuration_does_not_give_are_refused(folder):

@@ -68,6 +68,7 @@ def test_what_is_not_finite_becomes_null(good):
         "least": None,
         "median": None,
         "greatest": None,
+        "units": "1",
     }
     assert facts["parameters"]["damping_ratio"]["value"] is None
 

@@ -35,9 +35,15 @@ def test_the_edition_of_1995_knows_ranges_and_that_of_2013_sizes():
     )
 
 
-@pytest.mark.parametrize("grade", [0, 13, -1, 7.5, float("nan")])
+def test_the_finest_grade_is_0():
+    # Table 1 of the edition of 1995: 0.8 um for modules up to 2 mm and diameters up to 20 mm.
+    assert single_pitch_um(0, 1.0, 10.0) == 0.8
+    assert single_pitch_um(5, 1.0, 10.0) == 4.7
+
+
+@pytest.mark.parametrize("grade", [13, -1, 7.5, float("nan")])
 def test_other_grades_are_refused(grade):
-    with pytest.raises(ValueError, match=r"grade .*: ISO 1328-1:1995 has grades 1 to 12"):
+    with pytest.raises(ValueError, match=r"grade .*: ISO 1328-1:1995 has grades 0 to 12"):
         single_pitch_um(grade, 3.0, 100.0)
 
 

@@ -161,6 +161,23 @@ def test_basins_are_those_of_the_command(folder, capsys):
     assert shares == {row[at] for row in page.rows if len(row) == 10 and row[0] == "1"}
 
 
+def test_errors_have_the_unit_of_the_report(tmp_path, capsys):
+    chaotic = ("sweep={parameter='pitch_error', values=[14.0]}", "integration.error_check=1.0")
+    file = Path(__file__).parents[2] / "sweeps" / "pan2021.toml"
+    short = ("mesh.length_scale_um=25.0", "outputs.section_points=100")
+    result = gearchaos.run(gearchaos.load_config(file, (*chaotic, *short)))
+    result.save(tmp_path / "one.h5")
+    assert result["motion"].tolist() == [2]
+    page = report(tmp_path / "one.h5", capsys, "--units", "physical")
+    assert "was not measured in this run" not in page.text
+    (row,) = [row for row in page.rows if row[:2] == ["exponent error", "from the step"]]
+    rate = float(result.parameters["scaling_frequency"].values)
+    assert row[2] == "s^-1"
+    assert float(row[-1]) == pytest.approx(rate * result["exponent_step_error"][0], rel=1e-4)
+    (row,) = [row for row in page.rows if row[0] == "axis pitch_error"]
+    assert row[1].endswith("1 value, 14")
+
+
 def test_a_carried_sweep_has_stages_of_both_directions(folder, capsys):
     captions = report(folder / "carried.h5", capsys).text
     assert "Stages over pitch_error, upwards" in captions

@@ -213,6 +213,15 @@ def test_the_other_parameter_can_be_listed_but_not_starts():
             one_axis(result, **fixed)
 
 
+def test_exponents_and_lanes_are_those_of_all_starts():
+    one = lanes("111")
+    exponents = one.exponent[:, np.newaxis] + np.array([0.0, 0.25, -0.5])
+    several = one._replace(repeats=(exponents, np.zeros((3, 3), dtype=np.int32)))
+    (stage,) = stage_table(several)
+    assert stage.lanes == 9
+    assert (stage.lowest_exponent, stage.highest_exponent) == (-3.5, -0.75)
+
+
 def test_a_result_without_labels_has_no_stages():
     full = result_over(AXES["one start"])
     variables = [variable for name, variable in full.variables.items() if name != "motion"]

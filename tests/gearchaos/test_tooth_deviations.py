@@ -382,7 +382,7 @@ FAULTS = {
         "smoothing = 1e-07: must be at least 0.01",
     ),
     "no kind": ("[pitch_error]\ngrade = 7\n", (), 'grade = 7: has no meaning with kind = "sine"'),
-    "grade 0": (GRADE, ["pitch_error.grade=0"], "pitch_error.grade = 0: must be at least 1"),
+    "grade -1": (GRADE, ["pitch_error.grade=-1"], "pitch_error.grade = -1: must be at least 0"),
     "grade 13": (GRADE, ["pitch_error.grade=13"], "pitch_error.grade = 13: must be at most 12"),
     "half a grade": (GRADE, ["pitch_error.grade=7.5"], "grade = 7.5: must be a whole number"),
     "edition": (GRADE, ["pitch_error.edition=2008"], "edition = 2008: must be one of 1995 or 2013"),
@@ -415,7 +415,7 @@ FAULTS = {
     "swept grade 13": (
         GRADE,
         ["sweep={parameter='pitch_error.grade', values=[12.0, 13.0]}"],
-        "pitch_error.grade must be finite and >= 1 and <= 12",
+        "pitch_error.grade must be finite and >= 0 and <= 12",
     ),
     "swept grade, effect off": (
         GRADE,

@@ -8,6 +8,7 @@ import pytest
 from gearchaos.outputs.variable import coordinate
 from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.records.zero_one import FEWEST, zero_one
+from gearchaos.results.reading.opinions import Opinions
 from gearchaos.results.reading.result import Result
 from gearchaos.stages import main
 
@@ -43,8 +44,17 @@ def test_short_and_incomplete_series_have_no_value():
     assert np.isnan(zero_one(np.append(logistic(4.0), np.nan)))
 
 
-def saved(folder, points: int = POINTS):
-    """Save a sweep of the logistic map whose lane at rate 3.5 is labelled chaotic."""
+def between(points, repeats):
+    """Return points with others between them, (points * repeats,)."""
+    shifts = np.arange(1.0 - repeats, 1.0)
+    return (points[:, np.newaxis] + shifts).ravel()
+
+
+def saved(folder, points: int = POINTS, repeats: int = 1):
+    """Save a sweep of the logistic map whose lane at rate 3.5 is labelled chaotic.
+
+    ``repeats``: section points of each period of the excitation, which differ.
+    """
     rates, periods = np.array([*RATES]), np.array([*RATES.values()])
     chaotic = MOTION_MEANINGS.index("chaotic")
     wrong = np.where(rates == 3.5, 0, periods)
@@ -59,7 +69,7 @@ def saved(folder, points: int = POINTS):
     )
     nothing = np.zeros((rates.size, 1))
     data = {
-        "section_delta_5": [logistic(rate, points) for rate in rates],
+        "section_delta_5": [between(logistic(rate, points // repeats), repeats) for rate in rates],
         "motion": np.where(wrong, 0, chaotic),
         "period": wrong,
         "bands": 0 * wrong,
@@ -69,7 +79,8 @@ def saved(folder, points: int = POINTS):
         "start_state": nothing,
         "end_state": nothing,
     }
-    Result(["load"], variables, data, {}, {"title": "logistic"}).save(folder / "map.h5")
+    metadata = {"title": "logistic", "excitation_period": repeats}
+    Result(["load"], variables, data, {}, metadata).save(folder / "map.h5")
     return str(folder / "map.h5")
 
 
@@ -85,6 +96,22 @@ def test_the_command_lists_lanes_that_contradict_their_label(tmp_path, capsys):
     assert [one["K"] for one in found] == [zero_one(logistic(rate)) for rate in RATES]
     assert main([path]) == 0
     assert "0-1" not in capsys.readouterr().out
+
+
+def test_points_within_a_period_of_the_excitation_are_no_chaos(tmp_path, capsys):
+    path = saved(tmp_path, 12 * POINTS, 12)
+    assert main([path, "--zero-one", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["zero_one"]
+    expected = [zero_one(logistic(rate, POINTS)) for rate in RATES]
+    assert [one["K"] for one in found] == pytest.approx(expected, abs=1e-9)
+    (tmp_path / "short").mkdir()
+    assert main([saved(tmp_path / "short", 1188, 12), "--zero-one"]) == 0
+    assert "no section has 1200 points, 100 periods of the excit" in capsys.readouterr().out
+
+
+def test_a_motion_that_grows_has_no_second_opinion():
+    found = Opinions(np.zeros(2), np.array(["grows", "period 1"]), np.array([0.9, 0.9]))
+    assert found.contradict.tolist() == [False, True]
 
 
 def test_short_sections_are_reported(tmp_path, capsys):

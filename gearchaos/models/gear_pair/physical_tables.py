@@ -180,7 +180,7 @@ class GradeError(Table):
     kind: Literal["grade"] = key(_KIND)
     mean_um: float = _mean()
     smoothing: float = _smoothing()
-    grade: float = key("accuracy grade of both gears", "1", 7, ge=1, le=12, multiple_of=1)
+    grade: float = key("accuracy grade of both gears", "1", 7, ge=0, le=12, multiple_of=1)
     edition: Literal[1995, 2013] = key("edition of ISO 1328-1", default=1995)
     seed: int = key("seed of the drawn gears", default=0, ge=0, le=2**32 - 1)
     realisations: int = key("number of drawn gear pairs", default=1, ge=1, le=1_000_000)

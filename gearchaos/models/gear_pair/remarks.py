@@ -75,7 +75,7 @@ def _grade_of(single: float, spread: float, pair: Pair, teeth: int) -> str:
     module = pair.normal_module_mm
     diameter = teeth * module / math.cos(math.radians(pair.helix_angle_deg))
     try:
-        for grade in range(1, 13):
+        for grade in range(13):
             limits = (limit(grade, module, diameter) for limit in (single_pitch_um, cumulative_um))
             if all(one <= most for one, most in zip((single, spread), limits, strict=True)):
                 return f"grade {grade} of ISO 1328-1:1995"

@@ -76,7 +76,7 @@ class PhysicalTables(Titled):
     bearings: Bearings | None = key("the bearings", default=None)
     groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
 
-    # Searches for orbits ask for the groups at thousands of values, one after the other.
+    # Searches for orbits need the groups at thousands of values, one after the other.
     @cached_property
     def physical(self) -> Mapping[str, Any]:
         """Every key of the physical tables by its path, with its value or None."""
@@ -213,7 +213,7 @@ def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> Re
 def _resolved(
     config: GearPairTables, values: Mapping[str, npt.ArrayLike], swept: Mapping[str, npt.ArrayLike]
 ) -> ResolvedGroups:
-    """Return the groups for values of parameters, of which ``swept`` are groups."""
+    """Return the groups for values of parameters; ``swept``: those that are groups."""
     physical = physical_at(config, values)
     if "stiffness_variation" not in config.scene.effects:
         # Unused, so that a sweep of what they depend on need not compile formulas for them.

@@ -1,5 +1,6 @@
 """Basins in physical units."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,10 +8,10 @@ import numpy as np
 from gearchaos.arrays import Floats
 from gearchaos.models.catalogues import scale_of
 from gearchaos.outputs.names import LARGEST_EXPONENT, STATE
-from gearchaos.outputs.scales import Scale
 from gearchaos.outputs.variable import Variable
 from gearchaos.results.reading.ensembles import Basin, Basins
 from gearchaos.results.reading.physical_units import in_physical_units
+from gearchaos.results.reading.tables import unit_text
 
 
 def physical_basins(found: Basins) -> Basins:
@@ -22,12 +23,9 @@ def physical_basins(found: Basins) -> Basins:
     swept = found.parameter in result
     values = np.asarray(result[found.parameter] if swept else found.values, dtype=np.float64)
     states = found.result.variables[STATE].flags
-    scales: dict[str, Scale] = {state: scale_of(state, result.metadata) for state in states}
-    names = {name for one in found.basins for name in (LARGEST_EXPONENT, *one.means)}
-    scales |= {n: found.result.variables[n].scale for n in names if n in found.result.variables}
     units, factors = dict[str, str](), dict[str, Floats]()
-    for name, scale in scales.items():
-        units[name], factors[name] = _factors(found, name, scale)
+    for name in (*states, *found.units):
+        units[name], factors[name] = _factors(found, name)
 
     def converted(one: Basin) -> Basin:
         at = int(np.flatnonzero(found.values == one.value)[0])
@@ -48,10 +46,14 @@ def physical_basins(found: Basins) -> Basins:
     )
 
 
-def _factors(found: Basins, name: str, scale: Scale) -> tuple[str, Floats]:
+def _factors(found: Basins, name: str) -> tuple[str, Floats]:
     """Return the physical unit of a quantity, and what to multiply it by at each value."""
-    unscaled = Variable(name, (found.parameter,), "float64", "1", name, scale=scale)
+    known = found.result.variables.get(name)
+    if known is None:
+        scale = scale_of(name, found.result.metadata)
+        known = Variable(name, (), "float64", "1", name, scale=scale)
+    of_value = replace(known, dims=(found.parameter,))
     changed, factors = in_physical_units(
-        unscaled, np.ones(found.values.size), found.result.parameters
+        of_value, np.ones(found.values.size), found.result.parameters
     )
-    return changed.units, factors
+    return unit_text(changed), factors

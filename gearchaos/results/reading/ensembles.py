@@ -199,7 +199,7 @@ class Basins(NamedTuple):
     entropy : list of tuple
         `basin_entropy` at each value; empty if the starts are no grid.
     units : mapping of str to str
-        Physical units of states, exponents and means by name; empty for dimensionless basins.
+        Units of exponents and means by name, of physical basins also those of states.
     """
 
     result: Result

@@ -88,7 +88,7 @@ def list_basins(found: Basins) -> Listed:
     """List the basins of all values: number, motion, multiplier, exponent, share with interval."""
     headings = [f"{found.parameter} [{unit_of_axis(found.result, found.parameter)}]"]
     headings += ["number", "motion", "period [1]", "multiplier [1]"]
-    headings += [f"exponent [{found.units.get(LARGEST_EXPONENT, 'per unit of tau')}]"]
+    headings += [f"exponent [{found.units.get(LARGEST_EXPONENT, '1')}]"]
     headings += ["starts [1]", "share [1]", "share, 95 % from [1]", "share, 95 % to [1]"]
     rows = [
         [

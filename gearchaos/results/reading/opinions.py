@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from gearchaos.arrays import Floats, Mask
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.zero_one import FEWEST, zero_one
+from gearchaos.results.reading.excitation import excitation_of
+from gearchaos.results.reading.jumps import sections_of
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import labelled_lanes
 
@@ -18,24 +20,36 @@ LIMIT = 0.5
 MOST_LISTED = 8  # Most contradicting lanes that are listed.
 
 
+WITHOUT_OPINION = ("unresolved", "diverged", "grows")
+"""Labels that the test neither confirms nor contradicts."""
+
+
 class Opinions(NamedTuple):
-    """Value of the 0-1 test of each lane, NaN where it is unknown, with swept value and label."""
+    """Value of the 0-1 test of each lane, NaN where it is unknown, with swept value and label.
+
+    ``needed``: fewest section points of a file with which the test is evaluated.
+    """
 
     values: Floats
     labels: NDArray[np.str_]
     tests: Floats
+    needed: int = FEWEST
 
     @property
     def contradict(self) -> Mask:
-        """Whether the test and the label disagree about chaos; unresolved lanes have no opinion."""
-        known = np.isfinite(self.tests) & ~np.isin(self.labels, ("unresolved", "diverged"))
+        """Whether the test and the label disagree about chaos; some labels have no opinion."""
+        known = np.isfinite(self.tests) & ~np.isin(self.labels, WITHOUT_OPINION)
         return np.asarray(known & ((self.tests > LIMIT) != (self.labels == "chaotic")))
 
     def lines(self) -> Iterator[str]:
         """Yield lines for a terminal."""
         known, wrong = np.isfinite(self.tests), self.contradict
         if not known.any():
-            yield f"0-1 test: no section has {FEWEST} points; raise outputs.section_points"
+            periods = f", {FEWEST} periods of the excitation" if self.needed > FEWEST else ""
+            yield (
+                f"0-1 test: no section has {self.needed} points{periods}; raise "
+                "outputs.section_points"
+            )
             return
         yield f"0-1 test: of {known.sum()} lanes {wrong.sum()} contradict their label"
         found = zip(self.values[wrong], self.labels[wrong], self.tests[wrong], strict=True)
@@ -62,5 +76,7 @@ def second_opinions(result: Result, name: str) -> Opinions:
             "or choose a start and a system with --at"
         )
     lanes = labelled_lanes(result, name=name)
-    tests = np.array([zero_one(row) for row in result[sections[0]]])
-    return Opinions(lanes.values, lanes.labels, tests)
+    # Within a period of the excitation the points of a periodic motion differ, too.
+    tests = np.array([zero_one(points[:, 0]) for points in sections_of(result)])
+    needed = FEWEST * excitation_of(result.metadata).excitation_period
+    return Opinions(lanes.values, lanes.labels, tests, needed)

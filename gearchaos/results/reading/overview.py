@@ -12,6 +12,7 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.outputs import names as known
 from gearchaos.outputs.variable import Variable
+from gearchaos.progress import count_of
 from gearchaos.results.files.result_reader import printable, read_result
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
@@ -26,6 +27,9 @@ ERRORS = {
     ),
 }
 """Variables that measure an error: the label of the error, and where it comes from."""
+
+OF_THE_STEP = ("section_error", known.STEP_ERROR)
+"""Those that measure the error of the steps."""
 
 ELSEWHERE = ("title", "notes", "configuration", "configuration_resolved")
 """Metadata that are shown in other sections of the page."""
@@ -80,7 +84,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
         "counts": {v.name: _counts(v, data[v.name]) for v in of_lanes if _is_code(v)},
-        "errors": {v.name: _error(v.name, data[v.name]) for v in of_lanes if v.name in ERRORS},
+        "errors": {v.name: error_spread(v, data[v.name]) for v in of_lanes if v.name in ERRORS},
         "variables": {v.name: {"dims": v.dims, "dtype": v.dtype, **_wording(v)} for v in variables},
         "slice": {},
         "stages": [],
@@ -112,9 +116,14 @@ def _parameter(parameter: Variable) -> dict[str, Any]:
     return {"origin": parameter.origin, **content, **_wording(parameter)}
 
 
-def _error(name: str, values: Array) -> dict[str, Any]:
-    """Return the spread of an error; exponents of orbits have a standard error of 0, left out."""
-    return _spread(values[values > 0.0] if name.endswith(known.STANDARD_ERROR) else values)
+def error_spread(variable: Variable, values: Array) -> dict[str, Any]:
+    """Return number, least, median and greatest of errors, and their unit.
+
+    Exponents of orbits have a standard error of 0, which is left out.
+    """
+    if variable.name.endswith(known.STANDARD_ERROR):
+        values = values[values > 0.0]
+    return {**_spread(values), "units": variable.units}
 
 
 def _wording(entry: Variable) -> dict[str, str]:
@@ -151,7 +160,7 @@ def overview_page(
             if name not in ELSEWHERE and value not in (None, "")
         ),
         "Stages": _stages(overview),
-        "Dimensionless groups": _groups(overview["parameters"]),
+        "Parameters": _groups(overview["parameters"]),
         "Configuration": (_wrapped(line, "  ") for line in settings),
         "Variables": (
             _wrapped(f"{name} ({', '.join(one['dims'])}) {one['dtype']}{_units(one)}", "  ")
@@ -184,8 +193,8 @@ def _file(overview: Mapping[str, Any]) -> Iterator[str]:
     yield _entry("file", f"{overview['file']} ({overview['bytes']:,} bytes)")
     yield _entry("title", str(metadata.get("title", "")))
     for name, axis in overview["axes"].items():
-        values = "1 value" if axis["values"] == 1 else f"{axis['values']} values"
-        span = " and ".join(axis["meanings"]) or f"{_span(axis)}{_units(axis)}"
+        values = count_of(axis["values"], "value")
+        span = " and ".join(axis["meanings"]) or f"{span_text(axis)}{_units(axis)}"
         yield _entry("axis", f"{name} ({axis['long_name']}), {values}, {span}")
     yield _entry("lanes", f"{overview['lanes']}")
     for name, counts in overview["counts"].items():
@@ -197,7 +206,7 @@ def _file(overview: Mapping[str, Any]) -> Iterator[str]:
 def _errors(errors: Mapping[str, Any]) -> Iterator[str]:
     for name, spread in errors.items():
         if spread["values"]:
-            span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}"
+            span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}{_units(spread)}"
             label, cause = ERRORS[name]
             yield _entry(label, f"{span} in {spread['values']} lanes, {cause}")
 
@@ -205,11 +214,10 @@ def _errors(errors: Mapping[str, Any]) -> Iterator[str]:
 def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     lines = []
     for stage in overview["stages"]:
-        several = "s" if stage["lanes"] != 1 else ""
         bands = max(map(int, stage["bands"]), default=1)
         on_bands = f", on up to {bands} bands" if bands > 1 else ""
         span = f"{stage['start']:.6g} to {stage['end']:.6g}"
-        lines.append(f"{stage['label']}: {span}, {stage['lanes']} lane{several}{on_bands}")
+        lines.append(f"{stage['label']}: {span}, {count_of(stage['lanes'], 'lane')}{on_bands}")
     half = MOST_STAGES // 2
     if len(lines) > MOST_STAGES:
         more = f"{len(lines)} stages: the first {half} and the last {half}"
@@ -222,14 +230,18 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
 def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
     for name, entry in parameters.items():
         value = (
-            ", ".join(map(_number, np.ravel(entry["value"]))) if "value" in entry else _span(entry)
+            ", ".join(map(_number, np.ravel(entry["value"])))
+            if "value" in entry
+            else span_text(entry)
         )
         text = f"{name:26} {value}{_units(entry)} ({entry['origin']})"
         yield _wrapped(text, "  ", " " * 29)
 
 
-def _span(spread: Mapping[str, Any]) -> str:
-    return f"{_number(spread['least'])} to {_number(spread['greatest'])}"
+def span_text(spread: Mapping[str, Any]) -> str:
+    """Return least and greatest of some values, or the only value."""
+    least, greatest = _number(spread["least"]), _number(spread["greatest"])
+    return least if least == greatest else f"{least} to {greatest}"
 
 
 def _units(entry: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ from gearchaos.results.reading.result import Result
 
 
 class LabelledLanes(NamedTuple):
-    """Lanes in ascending order of the swept value, one per value.
+    """Lanes in ascending order of the swept value, one for each value.
 
     Attributes
     ----------
@@ -29,6 +29,9 @@ class LabelledLanes(NamedTuple):
         Largest Lyapunov exponent, NaN where it is unknown.
     bands : array of int, shape (lanes,)
         Number of bands, 0 where the motion has none or they are unknown.
+    repeats : tuple of array, or None
+        Exponents and bands of all drawn systems and starts of each value, both (lanes, repeats), if
+        a value has several; ``exponent`` and ``bands`` are then those of the first one.
     """
 
     values: Floats
@@ -36,6 +39,7 @@ class LabelledLanes(NamedTuple):
     period: Counts
     exponent: Floats
     bands: Counts
+    repeats: tuple[Floats, Counts] | None = None
 
 
 class Stage(NamedTuple):
@@ -54,7 +58,8 @@ class Stage(NamedTuple):
     lowest_exponent, highest_exponent : float
         Range of the largest Lyapunov exponent over the lanes with this label, NaN if unknown.
     lanes : int
-        Number of lanes, including those of narrower stages that were merged into it.
+        Number of lanes with all systems and starts, including those of narrower stages that were
+        merged into it.
     bands : dict of int to int
         Number of lanes with this label by their number of bands.
     """
@@ -134,12 +139,17 @@ def labelled_lanes(
     exponent = one[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
     every = np.stack([result[label].reshape(period.size, -1) for label in LABELS])
     alike = (every == every[:, :, :1]).all(axis=(0, 2))
+    together = alike[:, np.newaxis]
+    exponents = result[LARGEST_EXPONENT].reshape(period.size, -1) if known else exponent[:, None]
+    bands = result[BANDS].reshape(period.size, -1)
+    of_all = np.where(together, exponents, np.nan), np.where(together, bands, 0)
     return LabelledLanes(
         values=one[one.axis],
         labels=np.where(alike, labels, "several motions"),
         period=np.where(alike, period, 0),
         exponent=np.where(alike, exponent, np.nan),
         bands=np.where(alike, one[BANDS], 0),
+        repeats=of_all if every.shape[2] > 1 else None,
     )
 
 
@@ -227,9 +237,11 @@ def _stage(lanes: LabelledLanes, first: int, after: int, own: int) -> Stage:
     label, period = str(lanes.labels[own]), int(lanes.period[own])
     start, end = lanes.values[[first, after - 1]].tolist()
     alike = first + np.flatnonzero(lanes.labels[first:after] == label)
-    exponent, bands = lanes.exponent[alike], lanes.bands[alike]
+    exponents, bands = lanes.repeats or (lanes.exponent, lanes.bands)
+    exponent, bands = exponents[alike], bands[alike]
+    count = (after - first) * (bands.shape[1] if lanes.repeats else 1)
     known = exponent[np.isfinite(exponent)]
     low, high = (float(extreme.reduce(known, initial=np.nan)) for extreme in (np.fmin, np.fmax))
     numbers, counts = np.unique(bands[bands > 0], return_counts=True)
     by_bands = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
-    return Stage(first, after - 1, start, end, label, period, low, high, after - first, by_bands)
+    return Stage(first, after - 1, start, end, label, period, low, high, count, by_bands)
