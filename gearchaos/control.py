@@ -205,6 +205,8 @@ def table(facts: dict[str, Any], periods: str) -> list[str]:
         facts["multipliers"], facts["closed_multipliers"], facts["input_shares"], strict=True
     )
     lines += [f"  {_number(a):20} {_number(b):20} {share:.1e}" for a, b, share in rows]
+    if abs(facts["closed_multipliers"][0]) >= 1.0:
+        lines += ["the orbit is unstable with this controller, too"]
     lines += [
         f"captured: {facts['captured']} of {facts['starts']} starts, "
         f"{_percent(facts['captured_share'])} ({_percent(facts['captured_low'])} to "

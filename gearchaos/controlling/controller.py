@@ -53,7 +53,9 @@ class Controller:
     gain : array, shape (mesh periods, states)
         Gains K of u = -K (x - r), one for each mesh period of the orbit.
     multipliers, closed_multipliers : array of complex, shape (states,)
-        Floquet multipliers without and with control, largest modulus first.
+        Floquet multipliers without and with control, largest modulus first. Those with control
+        take all states as known. Delayed feedback remembers an orbit, and its loop has more of
+        them; these are the largest.
     shares : array, shape (states,)
         Share of the input in the mode of each of `multipliers`; see `controllability`.
 
@@ -93,7 +95,13 @@ class Controller:
         self.multipliers, self.shares = controllability(self.maps)
         self.gain = target.gain(self.settings)
         self._control = control_of([Designed(target, self.gain, self.settings)], self.equations)
-        self.closed_multipliers: Complex = sorted_multipliers(self.maps.closed(self.gain))
+        self.closed_multipliers = self._closed_multipliers()
+
+    def _closed_multipliers(self) -> Complex:
+        """Return the Floquet multipliers with control, the largest ones (states,)."""
+        delayed = self.settings.method == "delayed"
+        loop = self.maps.closed_with_delay if delayed else self.maps.closed
+        return sorted_multipliers(loop(self.gain))[: len(self.scales)]
 
     @property
     def load(self) -> float:

@@ -59,6 +59,21 @@ class PeriodMaps(NamedTuple):
         """Return the Jacobian over the whole orbit with gains, shape (mesh periods, states)."""
         return _product(self.jacobians - self.responses[:, :, np.newaxis] * gain[:, np.newaxis])
 
+    def closed_with_delay(self, gain: Floats) -> Floats:
+        """Return the Jacobian over the whole orbit with delayed feedback.
+
+        Each gain (mesh periods, states) is multiplied with the difference from the state one orbit
+        earlier. The states of the mesh periods of an orbit, and the one before, are the state of
+        the loop: the shape is (n, n) with n = states * (mesh periods + 1).
+        """
+        periods, states = self.points.shape
+        steps = np.zeros((periods, states * (periods + 1), states * (periods + 1)))
+        forced = self.responses[:, :, np.newaxis] * gain[:, np.newaxis]
+        steps[:, :states, :states] = self.jacobians - forced
+        steps[:, :states, -states:] += forced
+        steps[:, states:, :-states] = np.eye(states * periods)
+        return _product(steps)
+
 
 def _product(matrices: Floats) -> Floats:
     """Return the product of matrices (n, states, states), the first one applied first."""

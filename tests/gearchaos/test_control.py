@@ -78,6 +78,18 @@ def test_the_frame_of_the_closed_loop_has_the_designed_multipliers(method):
     np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(frame)), expected, atol=1e-8)
 
 
+@pytest.mark.parametrize("weight", [10.0, 300.0])
+def test_delayed_feedback_has_the_multipliers_with_which_deviations_grow(weight):
+    found = controller(method="delayed", limit=0.5, input_weight=weight)
+    motion = found.run(found.orbit.point[np.newaxis] + 1e-9, 41)
+    largest = np.abs(found.closed_multipliers[0])
+    assert largest > 1.0
+    assert found.closed_multipliers.shape == (6,)
+    # A complex pair turns while it grows.
+    rates = np.diff(np.log(motion.distance[0, 10:41]))
+    assert np.exp(rates.mean()) == pytest.approx(largest, rel=0.02)
+
+
 def test_placement_leaves_stable_multipliers_and_removes_unstable_ones():
     found = controller(method="placement")
     stable = found.multipliers[np.abs(found.multipliers) < 1.0]
