@@ -15,6 +15,7 @@ function comes near to zero, a point of the curve is therefore searched between 
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,21 +39,29 @@ LOCATED = 1e-11
 SHORT = 0.01
 """Length of such a stretch in which the derivative by the parameter is nearly linear."""
 
+MOST_GRAZINGS = 16
+"""Largest number of changes of the impacts on one flank between two points."""
+
+ROUNDED = 1e-8
+"""Distance up to which two changes of the impacts are one grazing."""
+
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
 
 
 def with_pairs_parted(curve: Curve, points: list[CurvePoint]) -> Finding[list[CurvePoint]]:
     """Search points that part pairs of special points of one kind; return all points in order."""
-    sought = [*_multipliers_near_zero(points), *near_grazings(curve, points)]
+    grazings = near_grazings(curve, points)
+    sought = [*_multipliers_near_zero(points), *grazings.tests]
 
     def between(one: CurvePoint, other: CurvePoint, share: float) -> Finding[CurvePoint | None]:
         return _between(curve, one, other, share)
 
-    found = yield from together(
-        [parting(points[at - 1 : at + 2], test, between) for at, test in sought]
-    )
-    return joined_with(points, [(at, one) for (at, _), one in zip(sought, found, strict=True)])
+    searches = [parting(points[at - 1 : at + 2], test, between) for at, test in sought]
+    searches += [between(points[at], points[at + 1], share) for at, share in grazings.between]
+    found = yield from together(searches)
+    beside = [at for at, _ in (*sought, *grazings.between)]
+    return joined_with(points, [*zip(beside, found, strict=True)])
 
 
 def _multipliers_near_zero(points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
@@ -88,19 +97,56 @@ def specials_between(
     A flank is that of a grazing, and otherwise -1. ``located``: length of the stretch of the curve
     in which a special point lies.
     """
-    sought = [*_changes_of_sign(one, other), *_changes_of_impacts(one, other)]
+    sought = [*_changes_of_sign(one, other)]
     points = yield from together(
-        [_located(curve, one, other, function, located) for _, function, _ in sought]
+        [_located(curve, one, other, function, located) for _, function in sought]
     )
-    return [
-        (kind, point, flank)
-        for (kind, _, flank), point in zip(sought, points, strict=True)
-        if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers))
+    found = [
+        (kind, point.nearest, -1)
+        for (kind, _), point in zip(sought, points, strict=True)
+        if point is not None
+        and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.nearest.multipliers))
     ]
+    flanks = range(len(one.impacts))
+    grazings = yield from together(
+        [_grazings(curve, one, other, flank, located) for flank in flanks]
+    )
+    found += [(GRAZING, at, flank) for flank in flanks for at in grazings[flank]]
+    return found
 
 
-_Sought = tuple[str, Callable[[CurvePoint], float], int]
-"""Kind of a special point, the function that changes its sign there, and the flank or -1."""
+def _grazings(
+    curve: Curve, one: CurvePoint, other: CurvePoint, flank: int, located: float
+) -> Finding[list[CurvePoint]]:
+    """Search the points between two at which impacts on a flank appear or vanish."""
+    found: list[CurvePoint] = []
+    for _ in range(MOST_GRAZINGS):
+        if one.impacts[flank] == other.impacts[flank]:
+            break
+        before = one.impacts[flank]
+
+        def changed(at: CurvePoint, before: int = before) -> float:
+            return 1.0 if at.impacts[flank] == before else -1.0
+
+        point = yield from _located(curve, one, other, changed, located)
+        if point is None:
+            break
+        # Next to a grazing, rounding may begin and end contacts.
+        if not found or np.linalg.norm(point.nearest.place - found[-1].place) > ROUNDED:
+            found.append(point.nearest)
+        one = point.beyond
+    return found
+
+
+_Sought = tuple[str, Callable[[CurvePoint], float]]
+"""Kind of a special point, and the function that changes its sign there."""
+
+
+class _Place(NamedTuple):
+    """A located special point: the point nearest to it, and a point beyond."""
+
+    nearest: CurvePoint
+    beyond: CurvePoint
 
 
 def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
@@ -116,7 +162,7 @@ def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
         def test_function(at: CurvePoint, kind: str = kind) -> float:
             return _test_functions(at)[kind]
 
-        yield kind, test_function, -1
+        yield kind, test_function
 
 
 def _has_pair_on_circle(multipliers: Complex) -> bool:
@@ -126,25 +172,13 @@ def _has_pair_on_circle(multipliers: Complex) -> bool:
     return bool(nearest[0].imag != 0.0)
 
 
-def _changes_of_impacts(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
-    """Yield the flanks on which impacts appear or vanish between two points."""
-    for flank, (before, after) in enumerate(zip(one.impacts, other.impacts, strict=True)):
-        if before == after:
-            continue
-
-        def changed(at: CurvePoint, flank: int = flank, before: int = before) -> float:
-            return 1.0 if at.impacts[flank] == before else -1.0
-
-        yield GRAZING, changed, flank
-
-
 def _located(
     curve: Curve,
     one: CurvePoint,
     other: CurvePoint,
     function: Callable[[CurvePoint], float],
     located: float,
-) -> Finding[CurvePoint | None]:
+) -> Finding[_Place | None]:
     """Search the point between two points of a curve at which a function changes its sign.
 
     The method of false position with halved values (Illinois), or bisection where the function only
@@ -160,7 +194,7 @@ def _located(
         share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
         middle = yield from _between(curve, one, other, min(max(share, 1e-3), 1.0 - 1e-3))
         if middle is None:
-            return nearest if length < 1e-7 else None
+            return _Place(nearest, other) if length < 1e-7 else None
         nearest, value = middle, function(middle)
         if value == 0.0:
             break
@@ -170,7 +204,7 @@ def _located(
         else:
             other, high = middle, value
             low /= 2.0
-    return nearest
+    return _Place(nearest, other)
 
 
 def _between(

@@ -95,6 +95,12 @@ Where errors of a method fold a curve at the size of its jumps, it leads nowhere
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
 
+SHORTER = 1e-6
+"""Return distance after half the period below which an orbit is that of half the period."""
+
+AMPLITUDES = SIDEWAYS * np.array([1.0, -1.0, 0.3, -0.3, 0.1, 0.03, 0.01])
+"""Distances at which a doubled branch is searched, one after the other."""
+
 
 class Special(NamedTuple):
     """A special point of a branch.
@@ -207,16 +213,12 @@ def _abreast(
     return (yield from curve.correcting(guess, direction, normal))
 
 
-def trace(
-    curve: Curve, start: CurvePoint, one_way: bool = False, located: float = LOCATED
-) -> TracedBranch:
+def trace(curve: Curve, start: CurvePoint, located: float = LOCATED) -> TracedBranch:
     """Return the branch of `tracing`."""
-    return run(tracing(curve, start, one_way, located), defects_of)
+    return run(tracing(curve, start, located), defects_of)
 
 
-def tracing(
-    curve: Curve, start: CurvePoint, one_way: bool = False, located: float = LOCATED
-) -> Finding[TracedBranch]:
+def tracing(curve: Curve, start: CurvePoint, located: float = LOCATED) -> Finding[TracedBranch]:
     """Follow a branch from one of its points in both directions side by side.
 
     Parameters
@@ -225,8 +227,6 @@ def tracing(
         The curve of the branch.
     start : CurvePoint
         A point of the curve within the range.
-    one_way : bool
-        Whether the branch begins at this point, and is followed along its tangent only.
     located : float
         Length of the stretch of the branch in which a special point lies.
 
@@ -235,9 +235,8 @@ def tracing(
     TracedBranch
         The branch with its special points.
     """
-    starts = [start] if one_way else [start, start._replace(tangent=-start.tangent)]
-    (ahead, last), *back = yield from together([_half(curve, one) for one in starts])
-    behind, first = back[0] if back else ([start], HALVING)
+    starts = [start, start._replace(tangent=-start.tangent)]
+    (ahead, last), (behind, first) = yield from together([_half(curve, one) for one in starts])
     # One direction is enough for a closed curve, where the other may have been lost or have passed
     # its beginning.
     if last == CLOSED_CURVE and (first != CLOSED_CURVE or len(ahead) <= len(behind)):
@@ -294,19 +293,27 @@ def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | No
     Returns
     -------
     CurvePoint or None
-        The point of ``curve.doubled()``, with the tangent away from the doubling; None if it is not
-        found.
+        The point of ``curve.doubled()``; None if it is not found.
     """
     values, vectors = np.linalg.eig((yield from curve.jacobian(doubling.place)))
     vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
     direction = np.append(vector, 0.0) / np.linalg.norm(vector)
-    guess = doubling.place + SIDEWAYS * direction
-    return (yield from curve.doubled().correcting(guess, direction))
+    # The plane does not meet the branch of the orbits themselves.
+    normal = direction - (direction @ doubling.tangent) * doubling.tangent
+    normal /= np.linalg.norm(normal)
+    for amplitude in AMPLITUDES:
+        guess = doubling.place + amplitude * direction
+        start = yield from curve.doubled().correcting(guess, direction, normal)
+        if start is not None and start.half_return >= SHORTER:
+            return start
+    return None
 
 
 def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], str]]:
     """Follow a branch in the direction of a point's tangent; return its points and why it ends."""
     points, distances = [start], _distances(FIRST_STEP, curve.ahead)
+    if (start.share <= 0.0 and not start.onward) or (start.share >= 1.0 and start.onward):
+        return points, EDGE
     while len(points) < MOST_POINTS:
         here = points[-1]
         trials, leaves = yield from _next(curve, points[-2:], distances)
@@ -454,8 +461,13 @@ def _boldness(here: CurvePoint, trial: CurvePoint) -> float:
 
 
 def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
-    """Whether the orbit of half the period lies between two points: beyond it, phases swap."""
-    return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
+    """Whether the orbit of half the period lies between two points or is the second one.
+
+    Beyond it, phases swap.
+    """
+    return trial.half_return < SHORTER or bool(
+        here.halfway.size and here.halfway @ trial.halfway <= 0.0
+    )
 
 
 def _before(end: CurvePoint, points: Sequence[CurvePoint]) -> list[CurvePoint]:

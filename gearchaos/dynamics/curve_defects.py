@@ -38,11 +38,18 @@ class Request(NamedTuple):
     by_share: Floats | None = None
 
     def shares(self) -> list[float]:
-        """Return the share of the place, and one beside it if the derivative is unknown."""
+        """Return the share of the place, and those beside it if the derivative is unknown.
+
+        One on either side: next to a grazing, second derivatives are large. Where every share has
+        flow maps of its own, which cost more than lanes, there is one.
+        """
         # Beyond the ends of the way the value of the parameter may be invalid.
         share = min(max(float(self.place[-1]), 0.0), 1.0)
-        beside = share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)
-        return [share] if self.by_share is not None else [share, beside]
+        if self.by_share is not None:
+            return [share]
+        if self.curve.own_maps:
+            return [share, share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)]
+        return [share, min(share + DIFFERENCE, 1.0), max(share - DIFFERENCE, 0.0)]
 
 
 class Defect(NamedTuple):
@@ -80,20 +87,23 @@ Finding: TypeAlias = Search[Request, Defect, Found]
 
 
 class _Lanes(NamedTuple):
-    """The lanes of some places: one for each column of the Jacobian, and one beside.
+    """The lanes of some places: one for each column of the Jacobian, and those beside.
 
     Attributes
     ----------
     first : array of int, shape (places,)
         The first lane of each place.
     unknown : array of bool, shape (places,)
-        Whether a lane beside gives the derivative by the share.
+        Whether lanes beside give the derivative by the share.
+    other : array of int, shape (places,)
+        The lane with which the one beside is compared, from the first on.
     across : array, shape (places,)
-        Difference of the share of this lane.
+        Difference of the shares of both.
     """
 
     first: Integers
     unknown: Mask
+    other: Integers
     across: Floats
 
 
@@ -137,11 +147,11 @@ def _integrated(
     known = np.array([len(one) for one in shares])
     numbers = np.repeat([request.curve.number for request in requests], known)
     system = first.systems_at(numbers, np.concatenate(shares))
-    # One lane for each column of the Jacobian, and one for the difference by the parameter.
-    copies = np.concatenate([[states, 1][:count] for count in known])
+    # One lane for each column of the Jacobian, others for the difference by the parameter.
+    copies = np.concatenate([[states, 1, 1][:count] for count in known])
     counts = states + known - 1
     points = np.array([request.place[:-1] * request.curve.scale for request in requests])
-    columns = np.eye(states)[[*range(states), 0]]
+    columns = np.eye(states)[[*range(states), 0, 0]]
     longest = int(periods.max())
     passed = integrate(
         system.of(np.repeat(np.arange(copies.size), copies)),
@@ -150,8 +160,12 @@ def _integrated(
         tangent_start=np.concatenate([columns[:count] for count in counts]),
         periods=np.repeat(periods, counts),
     )
-    across = np.array([one[-1] - one[0] for one in shares])
-    return system, _Lanes(np.cumsum(counts) - counts, known > 1, across), passed
+    # One lane is beside those of the Jacobian, or two: one of them on the other side.
+    other = np.where(known > 2, states + 1, 0)
+    across = np.array(
+        [one[min(1, len(one) - 1)] - one[-1 if len(one) > 2 else 0] for one in shares]
+    )
+    return system, _Lanes(np.cumsum(counts) - counts, known > 1, other, across), passed
 
 
 def _slopes(requests: Sequence[Request], lanes: _Lanes, passed: Outcome, scale: Floats) -> Floats:
@@ -163,7 +177,8 @@ def _slopes(requests: Sequence[Request], lanes: _Lanes, passed: Outcome, scale: 
     slopes[:, :, :-1] = jacobian * scale[:, np.newaxis] / scale[:, :, np.newaxis]
     slopes[:, :, :-1] -= np.eye(states)
     new, ends = lanes.unknown, passed.section[:, -1]
-    beside = ends[lanes.first[new] + states] / scale[new] - ends[lanes.first[new]] / scale[new]
+    first = lanes.first[new]
+    beside = (ends[first + states] - ends[first + lanes.other[new]]) / scale[new]
     slopes[new, :, -1] = beside / lanes.across[new, np.newaxis]
     for at in np.nonzero(~new)[0].tolist():
         slopes[at, :, -1] = requests[at].by_share

@@ -4,7 +4,7 @@ Where an extreme reaches a flank, the orbit grazes it.
 """
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, gap_polynomials, gaps_along
+from gearchaos_kernels import Gaps, LaneSystem, Plan, gap_polynomials, gaps_along
 
 from gearchaos.arrays import Floats, Integers
 
@@ -20,12 +20,12 @@ def nearest_extremes(
     """
     gaps = gaps_along(system, history, plan.steps_per_period)
     element = int(flanks[0]) // 2
-    flank = np.where(flanks % 2, -1.0, 1.0) * gaps.half_clearance[:, element]
-    rate, value = gaps.rate[:, :, element], gaps.value[:, :, element]
-    turns = rate[:, :-1] * rate[:, 1:] <= 0.0
+    flank, rate = _place_of(gaps, flanks), gaps.rate[:, :, element]
+    beyond = about_extremes(gaps, flanks)
+    turns = np.isfinite(beyond)
     aside = np.abs(np.arange(turns.shape[1]) + 0.5 - phases[:, np.newaxis])
     aside = np.minimum(aside, turns.shape[1] - aside)
-    away = np.where(np.isnan(aside), np.abs(_extremes(value, rate) - flank[:, np.newaxis]), aside)
+    away = np.where(np.isnan(aside), np.abs(beyond), aside)
     samples = np.argmin(np.where(turns, away, np.inf), axis=1)
     terms = gap_polynomials(system, plan, history, gaps, (samples, element))
     begin, end = (rate[np.arange(samples.size), samples + n] for n in (0, 1))
@@ -35,6 +35,23 @@ def nearest_extremes(
     beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - flank
     there = turns.any(axis=1)
     return np.where(there, beyond, np.nan), samples + 0.5 * (at + 1.0)
+
+
+def about_extremes(gaps: Gaps, flanks: Integers) -> Floats:
+    """Return about how far each extreme of a gap lies beyond a flank, (lanes, samples - 1).
+
+    ``flanks`` (lanes,) are those of one element. NaN in steps without an extreme.
+    """
+    element = int(flanks[0]) // 2
+    rate, value = gaps.rate[:, :, element], gaps.value[:, :, element]
+    beyond = _extremes(value, rate) - _place_of(gaps, flanks)[:, np.newaxis]
+    return np.where(rate[:, :-1] * rate[:, 1:] <= 0.0, beyond, np.nan)
+
+
+def _place_of(gaps: Gaps, flanks: Integers) -> Floats:
+    """Return where flanks (lanes,) of one element are, (lanes,)."""
+    clearance: Floats = gaps.half_clearance[:, int(flanks[0]) // 2]
+    return np.where(flanks % 2, -1.0, 1.0) * clearance
 
 
 def _extremes(value: Floats, rate: Floats) -> Floats:

@@ -1,18 +1,20 @@
 """Where orbits of a curve come near to grazing a flank without a change of their impacts.
 
-Two grazings of one flank between the same two points leave the number of impacts unchanged. The
-extreme of the gap that comes near to the flank is a test function with an amount.
+Two grazings of one flank between the same two points may leave the number of impacts unchanged. The
+extreme of the gap that comes near to the flank is a test function with an amount. Where two
+extremes cross the flank, the values of both show how far apart they do so.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate, steps_taken
+from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_taken
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint
-from gearchaos.dynamics.gap_extremes import nearest_extremes
+from gearchaos.dynamics.gap_extremes import about_extremes, nearest_extremes
 from gearchaos.dynamics.pairs_parting import nearly_zero
 
 TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
@@ -20,6 +22,10 @@ TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
 
 MOST_NUMBERS = 4_000_000
 """Largest number of values in the histories of some orbits."""
+
+
+FINE = 48
+"""Fewest steps per period with which extremes are searched, where steps need no maps."""
 
 
 class _Orbits(NamedTuple):
@@ -35,9 +41,12 @@ class _Orbits(NamedTuple):
         # Points may lie beyond the ends of the way, where the parameter may be invalid.
         shares = np.clip([one.share for one in points], 0.0, 1.0)
         system = curve.systems_at(np.full(len(points), curve.number), shares)
+        steps = steps_taken(system, curve.plan)
+        if not curve.own_maps:
+            # Between a few long steps, several extremes may lie.
+            steps *= -(-FINE // steps)
         plan = curve.plan._replace(
-            history_periods=curve.plan.recorded_periods,
-            steps_per_period=steps_taken(system, curve.plan),
+            history_periods=curve.plan.recorded_periods, steps_per_period=steps
         )
         start = np.array([one.place[:-1] for one in points]) * curve.scale
         return cls(system, plan, integrate(system, start, plan).history)
@@ -68,32 +77,67 @@ class _Extreme(NamedTuple):
         return orbits.extremes(slice(None), self.flank, phases)[0]
 
 
-def near_grazings(curve: Curve, points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
-    """Yield the points near which orbits may graze twice, and the test function of each.
+class NearGrazings(NamedTuple):
+    """Where orbits of a curve may graze twice between the same two points.
 
-    ``points``: those of a curve, in order.
+    Attributes
+    ----------
+    tests : list of (int, TestFunction)
+        Points near which one extreme of a gap comes near to a flank, and its test function.
+    between : list of (int, float)
+        Points after which two extremes cross a flank before the next point, and the share of the
+        way at which one of them has crossed it.
     """
+
+    tests: list[tuple[int, TestFunction]]
+    between: list[tuple[int, float]]
+
+
+def near_grazings(curve: Curve, points: Sequence[CurvePoint]) -> NearGrazings:
+    """Return where orbits may graze twice; ``points``: those of a curve, in order."""
+    found = NearGrazings([], [])
     if not points[0].impacts:
-        return
-    samples = curve.plan.recorded_periods * curve.plan.steps_per_period
+        return found
+    samples = curve.plan.recorded_periods * max(curve.plan.steps_per_period, FINE)
     many = max(MOST_NUMBERS // (samples * curve.scale.size), 8)
-    for first in range(0, len(points) - 2, many):
+    for first in range(0, max(len(points) - 2, 1), many):
         # Two more points: each is compared with both of its neighbours.
-        for at, test in _near_grazings(curve, points[first : first + many + 2]):
-            yield first + at, test
+        some = points[first : first + many + 2]
+        orbits = _Orbits.of(curve, some)
+        for flank in range(len(points[0].impacts)):
+            found.tests.extend((first + at, test) for at, test in _near(curve, some, orbits, flank))
+            found.between.extend((first + at, share) for at, share in _crossing(orbits, flank))
+    return found
 
 
-def _near_grazings(
-    curve: Curve, points: Sequence[CurvePoint]
+def _near(
+    curve: Curve, points: Sequence[CurvePoint], orbits: _Orbits, flank: int
 ) -> Iterator[tuple[int, TestFunction]]:
-    """Yield some of the points of `near_grazings`."""
-    orbits = _Orbits.of(curve, points)
+    """Yield the points near which an extreme comes near to a flank, and its test function."""
+    if len(points) < 3:
+        return
+    here, phases = orbits.extremes(slice(1, -1), flank, np.full(len(points) - 2, np.nan))
+    before, _ = orbits.extremes(slice(None, -2), flank, phases)
+    after, _ = orbits.extremes(slice(2, None), flank, phases)
     samples = orbits.history.shape[1] - 1
-    inner = slice(1, -1)
-    for flank in range(len(points[0].impacts)):
-        here, phases = orbits.extremes(inner, flank, np.full(len(points) - 2, np.nan))
-        before, _ = orbits.extremes(slice(None, -2), flank, phases)
-        after, _ = orbits.extremes(slice(2, None), flank, phases)
-        for at, values in enumerate(np.column_stack([before, here, after])):
-            if nearly_zero(points[at : at + 3], values):
-                yield at + 1, _Extreme(curve, flank, float(phases[at]) / samples).beyond
+    for at, values in enumerate(np.column_stack([before, here, after])):
+        if nearly_zero(points[at : at + 3], values):
+            yield at + 1, _Extreme(curve, flank, float(phases[at]) / samples).beyond
+
+
+def _crossing(orbits: _Orbits, flank: int) -> Iterator[tuple[int, float]]:
+    """Yield the points after which several extremes cross a flank, and shares of the way.
+
+    At each share, some of them have crossed it.
+    """
+    gaps = gaps_along(orbits.system, orbits.history, orbits.plan.steps_per_period)
+    beyond = about_extremes(gaps, np.full(len(orbits.history), flank))
+    of_points = [one[np.isfinite(one)] for one in beyond]
+    for at, (one, other) in enumerate(pairwise(of_points)):
+        # The extremes of neighbouring orbits follow each other in the same order.
+        if one.size != other.size:
+            continue
+        (crossing,) = np.nonzero(one * other < 0.0)
+        shares = np.sort(one[crossing] / (one[crossing] - other[crossing]))
+        for share in (shares[1:] + shares[:-1]) / 2.0:
+            yield at, float(share)

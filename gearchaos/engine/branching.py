@@ -45,6 +45,12 @@ MOST_PERIODS = 8
 NEAR, SAME = 0.02, 1e-4
 """Largest distance of a motion, and of a closed orbit, from its branch."""
 
+AMID = np.array([0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95])
+"""Shares of the arclength of a branch at which it is compared with known ones."""
+
+KNOWN = 0.8
+"""Least share of the compared points that lie on known branches if a branch is known."""
+
 
 class _Motion(NamedTuple):
     """A periodic motion: the share of the way, its section over a period, and its period."""
@@ -216,15 +222,19 @@ class BranchSearch:
     def _from_doubling(self, curve: Curve, special: Special) -> Finding[TracedBranch | None]:
         """Search the branch that begins at a period doubling; None if it is not found or known."""
         start = yield from doubled_start(curve, special.point)
-        return (yield from self._traced(curve.doubled(), start, True))
+        if start is None:
+            value = float(self.over.value(np.array(special.point.share)))
+            say(
+                f"no orbit of period {2 * curve.periods} is found next to the period doubling at "
+                f"{value:.10g}"
+            )
+        return (yield from self._traced(curve.doubled(), start))
 
-    def _traced(
-        self, curve: Curve, start: CurvePoint | None, one_way: bool = False
-    ) -> Finding[TracedBranch | None]:
+    def _traced(self, curve: Curve, start: CurvePoint | None) -> Finding[TracedBranch | None]:
         """Follow a branch from one of its points, unless it is known."""
         if start is None or (yield from self._holds(_motion_at(curve, start), SAME)):
             return None
-        return (yield from tracing(curve, start, one_way, self.located))
+        return (yield from tracing(curve, start, self.located))
 
     def _added(self, branch: TracedBranch) -> Iterator[Finding[TracedBranch | None]]:
         """Add a branch, and yield searches of those that begin or end on it."""
@@ -244,11 +254,17 @@ class BranchSearch:
                 yield self._from_doubling(branch.curve, special)
 
     def _found_before(self, branch: TracedBranch) -> Finding[bool]:
-        """Search whether most of some points amid a branch lie on a branch that is known."""
-        chosen = np.unique(np.linspace(0, len(branch.points) - 1, 7).astype(int)[1:-1])
+        """Search whether nearly all of some points amid a branch lie on branches that are known.
+
+        A branch that continues where another one has been lost is not known.
+        """
+        lengths = branch.positions[-1] * AMID
+        chosen = np.unique(
+            np.searchsorted(branch.positions, lengths).clip(0, len(branch.points) - 1)
+        )
         motions = [_motion_at(branch.curve, branch.points[at]) for at in chosen]
         held = yield from together([self._holds(one, SAME) for one in motions])
-        return 2 * sum(held) > len(motions)
+        return sum(held) >= KNOWN * len(motions)
 
     def _holds(self, motion: _Motion, tolerance: float, first: int = 0) -> Finding[bool]:
         """Search whether a motion lies on a branch that has been found, from the first on."""

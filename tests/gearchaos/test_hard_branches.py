@@ -1,0 +1,153 @@
+"""Branches of one mass between stops where they are hard to follow."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import gearchaos
+from gearchaos.engine.branching import find_branches
+from gearchaos.records.branch import EDGE, GRAZING, PERIOD_DOUBLING
+
+MASS = """
+[model]
+kind = "linear"
+coordinates = ["x"]
+mass = [1.0]
+stiffness = [{stiffness}]
+damping = [{damping}]
+frequency = {frequency}
+
+[clearance.stop]
+gap = {{ x = 1.0 }}
+stiffness = {stop}
+half_clearance = 1.0
+damping = {stop_damping}
+
+[force.one]
+on = {{ x = 1.0 }}
+mean = {mean}
+amplitude = {first}
+
+[force.two]
+on = {{ x = 1.0 }}
+amplitude = {second}
+order = 2
+phase_deg = 30.0
+
+[sweep]
+parameter = "{swept}"
+from = {low}
+to = {high}
+count = {count}
+
+[start]
+carry = "both"
+
+[outputs]
+section = ["x"]
+contact = true
+
+[integration]
+method = "taylor"
+transient_periods = 300
+recorded_periods = 100
+"""
+
+BASE = {
+    "stiffness": 0.1,
+    "damping": 0.08,
+    "frequency": 1.0,
+    "stop": 4.0,
+    "stop_damping": 0.0,
+    "mean": 0.0,
+    "first": 0.6,
+    "second": 0.0,
+    "count": 7,
+}
+HUMPS = BASE | {"stiffness": 1.0, "damping": 0.2, "frequency": 0.9, "stop": 0.5}
+"""The motion has two maxima in a period, which only the first force tells apart."""
+
+
+@cache
+def branches(longest, swept, low, high, **changes):
+    """Return the branches over a range, found from a sweep."""
+    text = MASS.format(**dict(BASE, **changes), swept=swept, low=low, high=high)
+    config = gearchaos.Configuration.from_toml(text, "mass.toml")
+    return find_branches(gearchaos.run(config), longest=longest).branches
+
+
+def asymmetric():
+    """Return the branches over the mean force, up to period 4."""
+    changes = {"stiffness": 0.05, "damping": 0.05, "frequency": 0.75, "stop": 3.0}
+    changes |= {"stop_damping": 0.02, "first": 0.4, "count": 41}
+    return branches(4, "force.one.mean", 0.25, 0.65, **changes)
+
+
+def grazings(found):
+    """Return where orbits graze the upper flank, in order."""
+    (branch,) = found
+    special = [one for one in branch.specials if one.kind == GRAZING]
+    return sorted(one.value for one in special if one.flank.endswith("upper side"))
+
+
+def test_no_orbit_of_a_branch_has_a_shorter_period():
+    found = asymmetric()
+    assert {one.period for one in found} == {1, 2, 4}
+    for one in found:
+        section = one.section / np.abs(one.section).max(axis=(0, 1))
+        for shorter in range(1, one.period):
+            if one.period % shorter == 0:
+                away = np.abs(section[:, shorter - 1] - section[:, -1]).max(axis=1)
+                assert away.min() > 1e-6
+
+
+def test_a_branch_begins_at_every_period_doubling():
+    found = asymmetric()
+    ends = {
+        period: np.concatenate([one.value[[0, -1]] for one in found if one.period == period])
+        for period in (2, 4)
+    }
+    for one in found:
+        for special in one.specials if one.period < 4 else ():
+            if special.kind == PERIOD_DOUBLING:
+                assert np.abs(ends[2 * one.period] - special.value).min() < 2e-3
+
+
+def test_a_branch_that_begins_at_the_edge_of_the_range_ends_there():
+    found = branches(1, "frequency", 0.3, 0.36)
+    assert len(found) == 2
+    assert all(one.ends == (EDGE, EDGE) for one in found)
+
+
+def response(amplitude):
+    """Return the largest displacement of the motion without contact."""
+    time = np.linspace(0.0, 2.0 * np.pi, 4001)
+    displacement = np.zeros_like(time)
+    for order, force, phase in ((1, 0.002, 0.0), (2, amplitude, np.radians(30.0))):
+        rate = order * HUMPS["frequency"]
+        gain = force / (1.0 - rate**2 + 1j * HUMPS["damping"] * rate)
+        displacement += (gain * np.exp(1j * (order * time + phase))).real
+    top = np.argmax(displacement)
+    bend = displacement[[top - 1, top, (top + 1) % 4000]]
+    slope, curvature = (bend[2] - bend[0]) / 2.0, bend[0] - 2.0 * bend[1] + bend[2]
+    return bend[1] - slope**2 / (2.0 * curvature)
+
+
+def test_two_maxima_that_meet_a_flank_one_after_the_other_graze_twice():
+    changes = HUMPS | {"first": 0.002, "second": 4.0, "count": 11}
+    found = grazings(branches(1, "force.two.amplitude", 1.0, 6.0, **changes))
+    assert len(found) == 2
+    exact = brentq(lambda amplitude: response(amplitude) - 1.0, 1.0, 4.0, xtol=1e-14)
+    assert found[0] == pytest.approx(exact, abs=1e-8)
+    assert 0.01 < found[1] - found[0] < 0.04
+
+
+@pytest.mark.parametrize(("second", "low", "high"), [(2.2702, -0.2, 0.21), (2.28, -0.11, 0.3)])
+def test_a_maximum_that_leaves_a_flank_while_another_meets_it_is_seen(second, low, high):
+    found = grazings(branches(1, "force.one.amplitude", low, high, **(HUMPS | {"second": second})))
+    # The opposite force is the same one half a period later.
+    assert len(found) == 2
+    assert found[0] == pytest.approx(-found[1], abs=1e-9)
+    assert found[1] > 1e-4
