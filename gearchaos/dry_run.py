@@ -109,7 +109,8 @@ def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
     """Return the lines about effects, states, lanes and the estimate, each with its heading."""
     config, lanes = run.config, run.lanes
     spans = [
-        f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
+        f"{count_of(axis.values.size, 'value')} of {axis.name} from {axis.values[0]:g} to "
+        f"{axis.values[-1]:g}"
         for axis in lanes.axes
         if axis.name not in (START, DIRECTION)
     ]

@@ -78,7 +78,8 @@ def complain(*texts: str) -> None:
     """Print and log warnings or errors on stderr, one per line, also with --quiet."""
     for text in texts:
         log("error" if text.startswith("error: ") else "warning", text)
-    _print(texts)
+    if texts:
+        _print(texts)
 
 
 def say(*texts: str) -> None:

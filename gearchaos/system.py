@@ -50,6 +50,7 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.models import Given, axis_values, configuration_of, swept_values
 from gearchaos.models.registry import model_of, system_of
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS
+from gearchaos.outputs.names import axis_name
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.records.branch import PeriodicBranch
 from gearchaos.records.period import coordinate_scale
@@ -84,7 +85,8 @@ class System:
     at : mapping of str to float, optional
         Values of parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``.
     **groups : float
-        Values of parameters by their names, such as ``pitch_error=10.75``.
+        Values of parameters by their names or those of their axes, such as ``pitch_error=10.75`` or
+        ``operation_speed_rpm=12000.0``.
 
     Attributes
     ----------
@@ -110,7 +112,9 @@ class System:
         self, config: Given, at: Mapping[str, float] | None = None, **groups: float
     ) -> None:
         config = configuration_of(config)
-        values = coordinates("at", at or {}) | coordinates("groups", groups)
+        of_axes = {axis_name(one): one for one in config.parameters}
+        named = {of_axes.get(name, name): value for name, value in groups.items()}
+        values = coordinates("at", at or {}) | coordinates("groups", named)
         self.config, _ = with_method(config.without_control().at(values))
         for sweep in self.config.sweeps.values():
             if swept_values(sweep).size > 1:

@@ -82,6 +82,10 @@ def shown(value: object) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+_IN_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "nm": 1e-3}
+"""Units of length at the end of keys, in um."""
+
+
 def suggestion(word: str, words: Iterable[str]) -> str:
     """Return ``did you mean `x`?`` for the nearest word, or an empty text."""
     by_lower = {candidate.lower(): candidate for candidate in words}
@@ -113,7 +117,8 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
     remedy = keys[path].remedy if path in keys and kind != "value_error" else ""
     if kind == "extra_forbidden":
         table = path.rpartition(".")[0]
-        remedy = _elsewhere(str(names[-1]), table, keys)
+        remedy = _in_unit(str(names[-1]), value, table, keys)
+        remedy = remedy or _elsewhere(str(names[-1]), table, keys)
         if path in keys:
             # Another kind of this table has the key; in pydantic the kind precedes the key.
             tag = next(name for name in _TAGS if f"{table}.{name}" in keys)
@@ -155,6 +160,17 @@ def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
         key = keys.get(declared_path(words, keys))
         tagged = not added and key is not None and len(key.tables) > 1
     return names
+
+
+def _in_unit(name: str, value: object, table: str, keys: Mapping[str, Key]) -> str:
+    """Return the remedy for a key that is known with another unit of length; empty for others."""
+    stem, _, unit = name.rpartition("_")
+    if unit not in _IN_UM or not isinstance(value, int | float) or isinstance(value, bool):
+        return ""
+    for other, size in _IN_UM.items():
+        if f"{table}.{stem}_{other}".lstrip(".") in keys:
+            return f"write {stem}_{other} = {float(f'{value * _IN_UM[unit] / size:.12g}')}"
+    return ""
 
 
 def _elsewhere(name: str, table: str, keys: Mapping[str, Key]) -> str:

@@ -67,6 +67,9 @@ class CsvText:
         reader = csv.reader(lines, delimiter=delimiter)
         self._rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
         self.headings = self._rows.pop(0)[1] if self._rows else []
+        self._cells_in = {
+            line: len("\t".join(row).rstrip().split("\t")) for line, row in self._rows
+        }
 
     def column(self, name: object, whose: str = "") -> list[float]:
         """Return the numbers of a column; ValueError with rule and remedy if there are none.
@@ -115,6 +118,11 @@ class CsvText:
     def _numbers(self, cells: list[tuple[int, str]], name: str, whose: str) -> Iterator[float]:
         """Yield the cells of a column as numbers."""
         for line, cell in cells:
+            if self._cells_in[line] > len(self.headings):
+                # A decimal comma would cut the number, and move the cells after it.
+                rule = f"line {line}: has {self._cells_in[line]} cells below {len(self.headings)} "
+                remedy = "correct it; decimals with a comma need semicolons between the columns"
+                raise ValueError(f"{rule}headings", remedy)
             text = cell.replace(",", ".") if self._decimal_comma else cell
             if not (NUMBER.fullmatch(text) and isfinite(float(text))):
                 rule = f"line {line}, column {name}: must be a finite number"

@@ -15,12 +15,13 @@ _DEGREE, _MM, _UM, _NEWTON_PER_UM = "degree", "mm", "um", "N/um"
 class Plausible(NamedTuple):
     """The values that a key usually has: ``low`` to ``high`` in ``units``, or zero.
 
-    The sign does not count.
+    The sign does not count. ``mistake``: what is often given instead, and what to do then.
     """
 
     low: float
     high: float
     units: str = ""
+    mistake: str = ""
 
     @property
     def words(self) -> str:
@@ -35,7 +36,7 @@ _RADIUS = Plausible(0.5, 10_000.0, _MM)
 _MASS = Plausible(1e-5, 1e5, "kg")
 _INERTIA = Plausible(1e-11, 1e6, "kg m^2")
 _BACKLASH = Plausible(0.5, 5000.0, _UM)
-_ERROR = Plausible(0.01, 1000.0, _UM)
+_ERROR = Plausible(0.1, 1000.0, _UM)
 _DAMPING_RATIO = Plausible(1e-5, 1.0)
 _STIFFNESS = Plausible(1e4, 1e13, "N/m")
 _DAMPING = Plausible(1e-3, 1e9, "N s/m")
@@ -60,7 +61,9 @@ PLAUSIBLE: Mapping[str, Plausible] = {
     "inertia_kg_m2": _INERTIA,
     "speed_rpm": Plausible(0.1, 1e6, "rpm"),
     "torque_Nm": Plausible(1e-5, 1e8, "N m"),
-    "mean_stiffness_N_per_um_mm": Plausible(0.05, 100.0, "N/(um mm)"),
+    "mean_stiffness_N_per_um_mm": Plausible(
+        0.05, 100.0, "N/(um mm)", "the stiffness of the whole face is divided by its width in mm"
+    ),
     "stiffness_N_per_um": Plausible(0.1, 1e6, _NEWTON_PER_UM),
     "bearing_N_per_um": Plausible(0.01, 1e6, _NEWTON_PER_UM),
     "length_scale_um": _BACKLASH,
@@ -117,6 +120,11 @@ def implausible(config: Tables) -> Iterator[str]:
             yield from _warning(path, PLAUSIBLE[name], value)
     for table in config.sweeps if "sweep" in given else ():
         sweep = config.sweeps[table]
+        if sweep.count == 1 and sweep.to not in (None, sweep.from_):
+            yield (
+                f"{table}.count = 1: only from = {sweep.from_:g} is computed, to = {sweep.to:g} is "
+                "not; raise it, or give values"
+            )
         known = config.parameters.get(sweep.parameter)
         name = known.path.rpartition(".")[2] if known else ""
         if known and name in PLAUSIBLE and known.path not in meant:
@@ -154,6 +162,7 @@ def _warning(path: str, usual: Plausible, value: Any) -> Iterator[str]:
         meant = [float(f"{one * fitting[unit]:.6g}") for one in numbers]
         probable = shown(meant if len(meant) > 1 else meant[0])
         found += f"; probably it is in {unit}: then write {probable}"
+    found += f"; {usual.mistake}" if usual.mistake else ""
     yield f'{found}; if it is meant, unusual = ["{path}"] leaves this warning out'
 
 

@@ -48,12 +48,15 @@ class RunPlan:
         Method, steps and periods, with the kept section.
     notes : tuple of str
         Notes for the user before the run.
+    warnings : tuple of str
+        Those of the notes that are printed with --quiet, too.
     """
 
     config: Configuration
     lanes: Lanes
     plan: kernels.Plan
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def chosen(self) -> Chosen:
@@ -122,7 +125,8 @@ def plan_run(config: Configuration) -> RunPlan:
     """
     unusual = [*implausible(config)]
     try:
-        return _planned(config).with_notes(*unusual)
+        run = _planned(config).with_notes(*unusual)
+        return replace(run, warnings=(*run.warnings, *unusual))
     except ConfigurationError as error:
         # A value in another unit may be the cause.
         causes = [f"{config.source}: {text}" for text in unusual]
@@ -151,4 +155,5 @@ def _planned(config: Configuration) -> RunPlan:
     )
     coarse = coarse_steps(lanes, steps) if judged else ""
     notes = [reason, note, coarse, needless_maps(lanes, plan), *remarks(lanes, lengths)]
-    return RunPlan(config, lanes, plan, tuple(text for text in notes if text))
+    warnings = (coarse,) if coarse else ()
+    return RunPlan(config, lanes, plan, tuple(text for text in notes if text), warnings)

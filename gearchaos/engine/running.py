@@ -26,7 +26,7 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Given, configuration_of
 from gearchaos.outputs.variable import Variable, require_listed
-from gearchaos.progress import say, speaking
+from gearchaos.progress import complain, say, speaking
 from gearchaos.results.reading.result import Result
 
 COMPILING = "preparing the kernel of this scene, once; this may take up to a minute"
@@ -124,7 +124,8 @@ def prepare(run: RunPlan, *, compile_now: bool = True, history_periods: int = 0)
         run = with_controllers(with_chosen_steps(run))
         if compile_now and run.lanes.controllers is not None:
             rehearse(run, history_periods)
-    say(*run.notes)
+    complain(*run.warnings)
+    say(*(note for note in run.notes if note not in run.warnings))
     return run
 
 

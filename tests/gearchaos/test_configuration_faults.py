@@ -31,6 +31,7 @@ ONE_FAULT = [
     ("sweep.cuont=3", "sweep.cuont = 3", "unknown key", "did you mean `count`?"),
     ("sweeep.count=3", 'sweeep = {"count" = 3}', "unknown key", "did you mean `sweep`?"),
     ("pair.torque_Nm=3.0", "pair.torque_Nm = 3.0", "unknown key", "`operation.torque_Nm`"),
+    ("mesh.half_backlash_mm=0.06", "half_backlash_mm = 0.06", "unknown key", "_um = 60.0"),
     ("start.qqq=3", "start.qqq = 3", "unknown key", "the keys of [start] are kind, state"),
     ("mesh.stiffness.sine=[1.0]", "sine = [1.0]", "unknown key", "`sine_N_per_um_mm`"),
     # wrong types

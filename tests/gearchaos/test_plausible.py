@@ -82,3 +82,24 @@ def test_every_plausible_key_exists():
 
     names = {path.rpartition(".")[2] for kind in kinds for path in configuration_keys(kind)}
     assert {*PLAUSIBLE} <= names
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("mesh.half_backlash_um=0.06", "probably it is in mm: then write 60.0"),
+        ("sweep={parameter='load', from=0.1, to=0.3, count=1}", "to = 0.3 is not"),
+    ],
+)
+def test_a_quiet_run_prints_warnings(tmp_path, override, words):
+    small_config(tmp_path)
+    given = ("gears.toml", "--dry-run", "--quiet", "--set", override)
+    ended = run_module("gearchaos.sweep", *given, cwd=tmp_path)
+    assert ended.code == 0
+    assert words in ended.err
+    assert "preparing" not in ended.err
+
+
+def test_a_stiffness_of_the_whole_face_is_told_what_to_do(tmp_path):
+    (text,) = warned(tmp_path, "mesh.mean_stiffness_N_per_um_mm=420.0")
+    assert "the stiffness of the whole face is divided by its width in mm" in text

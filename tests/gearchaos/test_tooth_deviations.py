@@ -203,6 +203,10 @@ FAULTY_FILES = {
         "line 3, column Fp: must be a finite number; give",
     ),
     "decimal comma": (ROWS.replace("Fp", "x,Fp").replace("4.0", '0,"4,0"'), "must be a finite"),
+    "decimal comma between commas": (
+        "No,Fp\n1,0,0\n2,1,5\n3,2,5\n4,3,0\n5,1,0\n",
+        "line 2: has 3 cells below 2 headings; correct it; decimals with a comma need semicolons",
+    ),
     "twice": ("Fp;Fp\n1;2\n", 'has several columns "Fp"; rename all but one of them'),
     "missing number": (
         "Zahn;Fp\n1;0,0\n2;1,0\n4;1,0\n5;2,0\n6;2,0\n",

@@ -1,11 +1,13 @@
 """Gear trains as the engine sees them: machines whose numbers are in kg, um, ms and N."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 import numpy as np
+from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Floats
+from gearchaos.models.linear.configuration import MachineConfiguration
 from gearchaos.models.linear.model import MachineModel
 from gearchaos.models.protocol import Scales
 from gearchaos.models.train.configuration import TrainConfiguration
@@ -48,6 +50,24 @@ class TrainModel(MachineModel):
             # The time is counted in common periods of the meshes, which are those of none of them.
             self.terms = COMMON_PERIOD
             self.exciter = "common period of the meshes"
+
+    def remarks(
+        self, config: MachineConfiguration, system: LaneSystem, parameters: Mapping[str, Floats]
+    ) -> Iterator[str]:
+        """Yield which meshes have no backlash, whether there is a load, and more of machines."""
+        assert isinstance(config, TrainConfiguration)
+        tight = [
+            path
+            for path, mesh in config.meshes
+            if getattr(mesh, "half_backlash_um", None) == 0.0
+            and f"{path}.half_backlash_um" not in config.swept
+        ]
+        if tight and "backlash" in config.scene.effects:
+            yield f"{', '.join(tight)}: half_backlash_um = 0, there is no backlash"
+        loads = [shaft.torque_Nm for shaft in config.shaft.values()]
+        if loads and not any(loads) and not any("torque" in path for path in config.swept):
+            yield "no shaft has torque_Nm: the train runs without load"
+        yield from super().remarks(config, system, parameters)
 
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:
         """Return the scales of frequency, and of speed: that of the common period of all meshes."""
