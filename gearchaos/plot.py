@@ -17,7 +17,7 @@ style. Texts stay texts in SVG, and fonts are embedded in PDF.
 --stages omits stages that are narrower than a 150th of the axis: they are merged into the
 surrounding stage, or into a stage of several motions.
 
-The paths of the figures go to stdout. A figure that this command drew before is replaced, so that
+The paths of the figures go to stdout. A figure that gearchaos drew before is replaced, so that
 the command can be repeated; any other file of that name is kept unless --overwrite is given.
 """
 

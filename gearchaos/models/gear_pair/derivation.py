@@ -275,7 +275,7 @@ SCALES = {
     STIFFNESS: ("N/m", "mean mesh stiffness", "$k_m$"),
     "equivalent_mass": ("kg", "equivalent mass", "$m_e$"),
     "mesh_period": ("s", "mesh period", ""),
-    "static_load": ("N", "static load", ""),
+    "static_load": ("N", "static load along the transverse line of action", ""),
 }
 """Scales of a model, and two groups in units: unit, wording and symbol by name."""
 
