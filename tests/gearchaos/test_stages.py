@@ -189,7 +189,8 @@ def test_a_slice_is_named_and_the_first_one_is_not_all(several, tmp_path):
     ]
     facts = listed(tmp_path)
     assert facts["slice"] == {"load": 0.1}
-    assert sum(stage["lanes"] for stage in facts["stages"]) == several["pitch_error"].size
+    # Two starts at each value.
+    assert sum(stage["lanes"] for stage in facts["stages"]) == 2 * several["pitch_error"].size
 
 
 def test_where_starts_come_to_different_motions_the_stage_says_so(several, tmp_path):
@@ -197,7 +198,7 @@ def test_where_starts_come_to_different_motions_the_stage_says_so(several, tmp_p
     differ = (labels != labels[:, :, :1]).any(axis=(0, 2))
     assert differ.any()
     told = [stage for stage in listed(tmp_path)["stages"] if stage["label"] == "several motions"]
-    assert sum(stage["lanes"] for stage in told) == differ.sum()
+    assert sum(stage["lanes"] for stage in told) == 2 * differ.sum()
     assert all(stage["highest_exponent"] is None for stage in told)
     one = listed(tmp_path, "--at", "start=1")
     assert one["slice"]["start"] == 1.0
@@ -215,7 +216,7 @@ def test_another_slice_is_listed_at_the_nearest_values(several, tmp_path):
     assert len(facts["stages"]) == 1 + changes.sum()
     over_loads = listed(tmp_path, "--at", "pitch_error=1.5")
     assert over_loads["parameter"] == "load"
-    assert sum(stage["lanes"] for stage in over_loads["stages"]) == 3
+    assert sum(stage["lanes"] for stage in over_loads["stages"]) == 2 * 3
 
 
 def test_a_bare_value_is_enough_where_there_is_one_other_axis(tmp_path):

@@ -116,5 +116,5 @@ def test_other_arguments_of_another_kind(wrong, config, system, result):
 
 def test_limits_beyond_the_grades_are_an_error_of_gearchaos():
     refused(gearchaos.iso1328.single_pitch_um, 13, 2.0, 50.0)
-    with pytest.raises(ValueError, match="grades 1 to 12"):
+    with pytest.raises(ValueError, match="grades 0 to 12"):
         gearchaos.iso1328.cumulative_pitch_um(13, 2.0, 50.0)
