@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_taken
 
-from gearchaos.arrays import Floats
+from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint
 from gearchaos.dynamics.gap_extremes import about_extremes, nearest_extremes
 from gearchaos.dynamics.pairs_parting import nearly_zero
@@ -51,7 +51,9 @@ class _Orbits(NamedTuple):
         start = np.array([one.place[:-1] for one in points]) * curve.scale
         return cls(system, plan, integrate(system, start, plan).history)
 
-    def extremes(self, lanes: slice, flank: int, phases: Floats) -> tuple[Floats, Floats]:
+    def extremes(
+        self, lanes: slice | Integers, flank: int, phases: Floats
+    ) -> tuple[Floats, Floats]:
         """Return how far extremes lie beyond a flank, and their phases, as `nearest_extremes`."""
         numbers = np.arange(len(self.history))[lanes]
         flanks = np.full(numbers.size, flank)
@@ -104,40 +106,55 @@ def near_grazings(curve: Curve, points: Sequence[CurvePoint]) -> NearGrazings:
         # Two more points: each is compared with both of its neighbours.
         some = points[first : first + many + 2]
         orbits = _Orbits.of(curve, some)
+        gaps = gaps_along(orbits.system, orbits.history, orbits.plan.steps_per_period)
         for flank in range(len(points[0].impacts)):
-            found.tests.extend((first + at, test) for at, test in _near(curve, some, orbits, flank))
-            found.between.extend((first + at, share) for at, share in _crossing(orbits, flank))
+            beyond = about_extremes(gaps, np.full(len(some), flank))
+            of_flank = _Extremes(curve, orbits, flank, beyond)
+            found.tests.extend((first + at, test) for at, test in of_flank.near(some))
+            found.between.extend((first + at, share) for at, share in of_flank.crossing())
     return found
 
 
-def _near(
-    curve: Curve, points: Sequence[CurvePoint], orbits: _Orbits, flank: int
-) -> Iterator[tuple[int, TestFunction]]:
-    """Yield the points near which an extreme comes near to a flank, and its test function."""
-    if len(points) < 3:
-        return
-    here, phases = orbits.extremes(slice(1, -1), flank, np.full(len(points) - 2, np.nan))
-    before, _ = orbits.extremes(slice(None, -2), flank, phases)
-    after, _ = orbits.extremes(slice(2, None), flank, phases)
-    samples = orbits.history.shape[1] - 1
-    for at, values in enumerate(np.column_stack([before, here, after])):
-        if nearly_zero(points[at : at + 3], values):
-            yield at + 1, _Extreme(curve, flank, float(phases[at]) / samples).beyond
+class _Extremes(NamedTuple):
+    """Extremes of a gap along the orbits of some points, and about how far beyond a flank.
 
-
-def _crossing(orbits: _Orbits, flank: int) -> Iterator[tuple[int, float]]:
-    """Yield the points after which several extremes cross a flank, and shares of the way.
-
-    At each share, some of them have crossed it.
+    ``beyond``: shape (points, samples - 1), see `about_extremes`.
     """
-    gaps = gaps_along(orbits.system, orbits.history, orbits.plan.steps_per_period)
-    beyond = about_extremes(gaps, np.full(len(orbits.history), flank))
-    of_points = [one[np.isfinite(one)] for one in beyond]
-    for at, (one, other) in enumerate(pairwise(of_points)):
-        # The extremes of neighbouring orbits follow each other in the same order.
-        if one.size != other.size:
-            continue
-        (crossing,) = np.nonzero(one * other < 0.0)
-        shares = np.sort(one[crossing] / (one[crossing] - other[crossing]))
-        for share in (shares[1:] + shares[:-1]) / 2.0:
-            yield at, float(share)
+
+    curve: Curve
+    orbits: _Orbits
+    flank: int
+    beyond: Floats
+
+    def near(self, points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
+        """Yield the points near which an extreme comes near to the flank, and its test function."""
+        size = np.min(np.abs(self.beyond), axis=1, initial=np.inf, where=np.isfinite(self.beyond))
+        least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+        # Estimates may have their least value one point aside.
+        beside = np.convolve(least, np.ones(3), "same") > 0.0 if least.size else least
+        chosen = np.flatnonzero(beside) + 1
+        if not chosen.size:
+            return
+        here, phases = self.orbits.extremes(chosen, self.flank, np.full(chosen.size, np.nan))
+        before, _ = self.orbits.extremes(chosen - 1, self.flank, phases)
+        after, _ = self.orbits.extremes(chosen + 1, self.flank, phases)
+        samples = self.orbits.history.shape[1] - 1
+        rows = zip(chosen.tolist(), np.column_stack([before, here, after]), phases, strict=True)
+        for at, values, phase in rows:
+            if nearly_zero(points[at - 1 : at + 2], values):
+                yield at, _Extreme(self.curve, self.flank, float(phase) / samples).beyond
+
+    def crossing(self) -> Iterator[tuple[int, float]]:
+        """Yield the points after which several extremes cross the flank, and shares of the way.
+
+        At each share, some of them have crossed it.
+        """
+        of_points = [one[np.isfinite(one)] for one in self.beyond]
+        for at, (one, other) in enumerate(pairwise(of_points)):
+            # The extremes of neighbouring orbits follow each other in the same order.
+            if one.size != other.size:
+                continue
+            (crossing,) = np.nonzero(one * other < 0.0)
+            shares = np.sort(one[crossing] / (one[crossing] - other[crossing]))
+            for share in (shares[1:] + shares[:-1]) / 2.0:
+                yield at, float(share)
