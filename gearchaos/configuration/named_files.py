@@ -67,8 +67,10 @@ class CsvText:
         reader = csv.reader(lines, delimiter=delimiter)
         self._rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
         self.headings = self._rows.pop(0)[1] if self._rows else []
+        # Without empty cells at the end of a line.
         self._cells_in = {
-            line: len("\t".join(row).rstrip().split("\t")) for line, row in self._rows
+            line: max((n for n, cell in enumerate(row, 1) if cell), default=0)
+            for line, row in self._rows
         }
 
     def column(self, name: object, whose: str = "") -> list[float]:

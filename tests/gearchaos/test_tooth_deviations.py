@@ -138,6 +138,7 @@ COLUMNS = {
     "tabs": "Fp\ttooth\n" + "".join(f"{f}\t{n}\n" for n, f in enumerate(F)),
     "one column": "Fp\r\n" + "".join(f"{f}\r\n" for f in F),
     "quotes": '"note","Fp"\n' + "".join(f'"a, b","{f}"\n' for f in F),
+    "a tab in quotes": '"note","Fp"\n' + "".join(f'"a\tb","{f}"\n' for f in F),
     "beside a longer one": "g,p,Fp\n" + "".join(f"0,1,{f}\n" for f in F) + "0,2,\n0\n",
     "a byte order mark": "\ufeffFp;x\n" + "".join(f"{f};\n" for f in F),
 }
