@@ -69,6 +69,10 @@ def fault_texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str
     return lines if rest == 0 else [*lines[:MOST_SHOWN], f"{source}: and {rest} more faults"]
 
 
+IN_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "nm": 1e-3}
+"""Units of length at the end of keys, in um."""
+
+
 def shown(value: object) -> str:
     """Return a value as TOML writes it, shortened, with printable characters only."""
     try:
@@ -80,10 +84,6 @@ def shown(value: object) -> str:
             text = "an integer of thousands of digits"
     text = text if len(text) <= MOST_CHARACTERS else f"{text[:MOST_CHARACTERS]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-
-
-_IN_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "nm": 1e-3}
-"""Units of length at the end of keys, in um."""
 
 
 def suggestion(word: str, words: Iterable[str]) -> str:
@@ -165,11 +165,11 @@ def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
 def _in_unit(name: str, value: object, table: str, keys: Mapping[str, Key]) -> str:
     """Return the remedy for a key that is known with another unit of length; empty for others."""
     stem, _, unit = name.rpartition("_")
-    if unit not in _IN_UM or not isinstance(value, int | float) or isinstance(value, bool):
+    if unit not in IN_UM or not isinstance(value, int | float) or isinstance(value, bool):
         return ""
-    for other, size in _IN_UM.items():
+    for other, size in IN_UM.items():
         if f"{table}.{stem}_{other}".lstrip(".") in keys:
-            return f"write {stem}_{other} = {float(f'{value * _IN_UM[unit] / size:.12g}')}"
+            return f"write {stem}_{other} = {float(f'{value * IN_UM[unit] / size:.12g}')}"
     return ""
 
 

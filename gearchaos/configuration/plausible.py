@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearchaos.configuration.messages import shown
+from gearchaos.configuration.messages import IN_UM, shown
 from gearchaos.configuration.tables import Tables, swept_values
 
 _DEGREE, _MM, _UM, _NEWTON_PER_UM = "degree", "mm", "um", "N/um"
@@ -90,7 +90,7 @@ PLAUSIBLE: Mapping[str, Plausible] = {
 
 _CONVERSIONS: Mapping[str, Mapping[str, float]] = {
     _MM: {"m": 1e3, "um": 1e-3, "inches": 25.4},
-    _UM: {"mm": 1e3, "m": 1e6, "nm": 1e-3},
+    _UM: {unit: size for unit, size in IN_UM.items() if unit != _UM},
     _DEGREE: {"radians": math.degrees(1.0)},
     "kg": {"g": 1e-3, "t": 1e3},
     "kg m^2": {"kg mm^2": 1e-6, "g mm^2": 1e-9},

@@ -97,22 +97,33 @@ def specials_between(
     A flank is that of a grazing, and otherwise -1. ``located``: length of the stretch of the curve
     in which a special point lies.
     """
-    sought = [*_changes_of_sign(one, other)]
-    points = yield from together(
-        [_located(curve, one, other, function, located) for _, function in sought]
-    )
-    found = [
-        (kind, point.nearest, -1)
-        for (kind, _), point in zip(sought, points, strict=True)
-        if point is not None
-        and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.nearest.multipliers))
+    sought = [
+        (kind, -1, _of_multipliers(curve, one, other, (kind, function), located))
+        for kind, function in _changes_of_sign(one, other)
     ]
-    flanks = range(len(one.impacts))
-    grazings = yield from together(
-        [_grazings(curve, one, other, flank, located) for flank in flanks]
-    )
-    found += [(GRAZING, at, flank) for flank in flanks for at in grazings[flank]]
-    return found
+    sought += [
+        (GRAZING, flank, _grazings(curve, one, other, flank, located))
+        for flank in range(len(one.impacts))
+    ]
+    found = yield from together([search for _, _, search in sought])
+    return [
+        (kind, point, flank)
+        for (kind, flank, _), points in zip(sought, found, strict=True)
+        for point in points
+    ]
+
+
+def _of_multipliers(
+    curve: Curve, one: CurvePoint, other: CurvePoint, sought: "_Sought", located: float
+) -> Finding[list[CurvePoint]]:
+    """Search the special point between two at which a function of the multipliers is zero."""
+    kind, function = sought
+    point = yield from _located(curve, one, other, function, located)
+    if point is None:
+        return []
+    nearest = point.nearest
+    turns = kind != NEIMARK_SACKER or _has_pair_on_circle(nearest.multipliers)
+    return [nearest] if turns else []
 
 
 def _grazings(

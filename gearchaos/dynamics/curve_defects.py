@@ -97,7 +97,7 @@ class _Lanes(NamedTuple):
         Whether lanes beside give the derivative by the share.
     other : array of int, shape (places,)
         The lane with which the one beside is compared, from the first on.
-    across : array, shape (places,)
+    across : array, shape (places with lanes beside,)
         Difference of the shares of both.
     """
 
@@ -160,11 +160,9 @@ def _integrated(
         tangent_start=np.concatenate([columns[:count] for count in counts]),
         periods=np.repeat(periods, counts),
     )
-    # One lane is beside those of the Jacobian, or two: one of them on the other side.
+    # The one beside is compared with the one on the other side, or with the place itself.
     other = np.where(known > 2, states + 1, 0)
-    across = np.array(
-        [one[min(1, len(one) - 1)] - one[-1 if len(one) > 2 else 0] for one in shares]
-    )
+    across = np.array([one[1] - one[2 if len(one) > 2 else 0] for one in shares if len(one) > 1])
     return system, _Lanes(np.cumsum(counts) - counts, known > 1, other, across), passed
 
 
@@ -179,7 +177,7 @@ def _slopes(requests: Sequence[Request], lanes: _Lanes, passed: Outcome, scale: 
     new, ends = lanes.unknown, passed.section[:, -1]
     first = lanes.first[new]
     beside = (ends[first + states] - ends[first + lanes.other[new]]) / scale[new]
-    slopes[new, :, -1] = beside / lanes.across[new, np.newaxis]
+    slopes[new, :, -1] = beside / lanes.across[:, np.newaxis]
     for at in np.nonzero(~new)[0].tolist():
         slopes[at, :, -1] = requests[at].by_share
     return slopes

@@ -23,7 +23,6 @@ TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
 MOST_NUMBERS = 4_000_000
 """Largest number of values in the histories of some orbits."""
 
-
 FINE = 48
 """Fewest steps per period with which extremes are searched, where steps need no maps."""
 
@@ -51,14 +50,11 @@ class _Orbits(NamedTuple):
         start = np.array([one.place[:-1] for one in points]) * curve.scale
         return cls(system, plan, integrate(system, start, plan).history)
 
-    def extremes(
-        self, lanes: slice | Integers, flank: int, phases: Floats
-    ) -> tuple[Floats, Floats]:
+    def extremes(self, lanes: Integers, flank: int, phases: Floats) -> tuple[Floats, Floats]:
         """Return how far extremes lie beyond a flank, and their phases, as `nearest_extremes`."""
-        numbers = np.arange(len(self.history))[lanes]
-        flanks = np.full(numbers.size, flank)
+        flanks = np.full(lanes.size, flank)
         return nearest_extremes(
-            self.system.of(numbers), self.plan, self.history[lanes], flanks, phases
+            self.system.of(lanes), self.plan, self.history[lanes], flanks, phases
         )
 
 
@@ -76,7 +72,7 @@ class _Extreme(NamedTuple):
         """Return how far it lies beyond the flank at some points of the curve, (points,)."""
         orbits = _Orbits.of(self.curve, points)
         phases = np.full(len(points), self.phase * (orbits.history.shape[1] - 1))
-        return orbits.extremes(slice(None), self.flank, phases)[0]
+        return orbits.extremes(np.arange(len(points)), self.flank, phases)[0]
 
 
 class NearGrazings(NamedTuple):
@@ -108,27 +104,29 @@ def near_grazings(curve: Curve, points: Sequence[CurvePoint]) -> NearGrazings:
         orbits = _Orbits.of(curve, some)
         gaps = gaps_along(orbits.system, orbits.history, orbits.plan.steps_per_period)
         for flank in range(len(points[0].impacts)):
-            beyond = about_extremes(gaps, np.full(len(some), flank))
-            of_flank = _Extremes(curve, orbits, flank, beyond)
-            found.tests.extend((first + at, test) for at, test in of_flank.near(some))
-            found.between.extend((first + at, share) for at, share in of_flank.crossing())
+            gap = _Gap(curve, orbits, flank, about_extremes(gaps, np.full(len(some), flank)))
+            found.tests.extend((first + at, test) for at, test in gap.near(some))
+            found.between.extend((first + at, share) for at, share in gap.crossing())
     return found
 
 
-class _Extremes(NamedTuple):
-    """Extremes of a gap along the orbits of some points, and about how far beyond a flank.
+class _Gap(NamedTuple):
+    """A gap along the orbits of some points, beside one of its flanks.
 
-    ``beyond``: shape (points, samples - 1), see `about_extremes`.
+    ``estimates``: how far its extremes lie beyond the flank, (points, samples - 1), as
+    `about_extremes`.
     """
 
     curve: Curve
     orbits: _Orbits
     flank: int
-    beyond: Floats
+    estimates: Floats
 
     def near(self, points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
         """Yield the points near which an extreme comes near to the flank, and its test function."""
-        size = np.min(np.abs(self.beyond), axis=1, initial=np.inf, where=np.isfinite(self.beyond))
+        size = np.min(
+            np.abs(self.estimates), axis=1, initial=np.inf, where=np.isfinite(self.estimates)
+        )
         least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
         # Estimates may have their least value one point aside.
         beside = np.convolve(least, np.ones(3), "same") > 0.0 if least.size else least
@@ -149,7 +147,7 @@ class _Extremes(NamedTuple):
 
         At each share, some of them have crossed it.
         """
-        of_points = [one[np.isfinite(one)] for one in self.beyond]
+        of_points = [one[np.isfinite(one)] for one in self.estimates]
         for at, (one, other) in enumerate(pairwise(of_points)):
             # The extremes of neighbouring orbits follow each other in the same order.
             if one.size != other.size:

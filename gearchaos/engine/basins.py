@@ -75,12 +75,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     require_labels(result, name)
     config = computable(result, name)
     swept = _swept_axes(result, name)
-    if config.start.carry != "none":
-        raise ConfigurationError(
-            f'{name}: start.carry = "{config.start.carry}": beyond the first value, lanes start '
-            "where those of the value before ended, so that their shares are no basins; sweep with "
-            'start.carry = "none"'
-        )
+    _require_own_starts(config, name)
     choose_threads(threads)
     lanes, starts = Lanes(config), config.start.size
     shape = result.lanes("motion").size, result.variables["state"].flags
@@ -114,6 +109,16 @@ def _swept_axes(result: Result, name: str) -> list[str]:
             'over one parameter: set start.kind = "grid" or start.count, fix others with sel (--at)'
         )
     return swept
+
+
+def _require_own_starts(config: Configuration, name: str) -> None:
+    """Raise ConfigurationError if lanes start where others have ended."""
+    if config.start.carry != "none":
+        raise ConfigurationError(
+            f'{name}: start.carry = "{config.start.carry}": beyond the first value, lanes start '
+            "where those of the value before ended, so that their shares are no basins; sweep with "
+            'start.carry = "none"'
+        )
 
 
 def _numbered_attractors(

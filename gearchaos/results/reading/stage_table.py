@@ -135,21 +135,19 @@ def labelled_lanes(
     motion, period = one["motion"].tolist(), one["period"]
     meanings = result.variables["motion"].flags
     labels = [label_text(meanings[m], n) for m, n in zip(motion, period.tolist(), strict=True)]
-    known = LARGEST_EXPONENT in result
-    exponent = one[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
     every = np.stack([result[label].reshape(period.size, -1) for label in LABELS])
     alike = (every == every[:, :, :1]).all(axis=(0, 2))
-    together = alike[:, np.newaxis]
-    exponents = result[LARGEST_EXPONENT].reshape(period.size, -1) if known else exponent[:, None]
-    bands = result[BANDS].reshape(period.size, -1)
-    of_all = np.where(together, exponents, np.nan), np.where(together, bands, 0)
+    known = LARGEST_EXPONENT in result
+    exponents = result[LARGEST_EXPONENT] if known else np.full(period.size, np.nan)
+    exponents = np.where(alike[:, np.newaxis], exponents.reshape(period.size, -1), np.nan)
+    bands = np.where(alike[:, np.newaxis], result[BANDS].reshape(period.size, -1), 0)
     return LabelledLanes(
         values=one[one.axis],
         labels=np.where(alike, labels, "several motions"),
         period=np.where(alike, period, 0),
-        exponent=np.where(alike, exponent, np.nan),
-        bands=np.where(alike, one[BANDS], 0),
-        repeats=of_all if every.shape[2] > 1 else None,
+        exponent=exponents[:, 0],
+        bands=bands[:, 0],
+        repeats=(exponents, bands) if every.shape[2] > 1 else None,
     )
 
 
