@@ -519,6 +519,22 @@ def test_deviations_headed_in_another_unit_than_um_are_refused(heading, tmp_path
         assert len(load_config(path).pitch_error.driving.cumulative_um) == len(F)
 
 
+@pytest.mark.parametrize(
+    "heading", ["fp", "fpt links", "f_p [um]", "Single pitch", "Einzelteilung"]
+)
+def test_a_column_headed_as_single_deviations_is_not_read_as_cumulative_ones(heading, tmp_path):
+    rows = [f"{number};{one:.1f}" for number, one in enumerate(np.subtract(F, np.mean(F)))]
+    (tmp_path / "sheet.csv").write_text("\n".join([f"Nr;{heading}", *rows]), encoding="utf-8")
+    path = tmp_path / "gears.toml"
+    keys = ('file = "sheet.csv"', f'column = "{heading}"')
+    path.write_text(driving(*keys))
+    with pytest.raises(ConfigurationError, match='as single deviations.*set holds = "single"'):
+        load_config(path)
+    for holds in "single", "cumulative":
+        path.write_text(driving(*keys, f'holds = "{holds}"'))
+        assert getattr(load_config(path).pitch_error.driving, f"{holds}_um") is not None
+
+
 def test_columns_that_number_the_teeth_differently_are_refused(tmp_path):
     rows = [f"{row};{6 - row};{F[row - 1]:.1f}" for row in range(1, 6)]
     (tmp_path / "sheet.csv").write_text("\n".join(["Nr;Zahn;Fp", *rows]), encoding="utf-8")

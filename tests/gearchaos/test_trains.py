@@ -182,12 +182,12 @@ DRIVES = [
     ("ring", "sun", "carrier"),
     ("ring", "carrier", "sun"),
 ]
-"""Driven, fixed and loaded member."""
+"""Input, fixed and loaded member."""
 
 
-def driven_set(drive, torque):
+def set_with(drive, torque):
     """Return a set whose planets mesh one third of a period after each other."""
-    roles = dict(zip(("driven", "fixed", "loaded"), drive, strict=True))
+    roles = dict(zip(("input", "fixed", "loaded"), drive, strict=True))
     teeth = {"sun_teeth": 28, "planet_teeth": 35, "ring_teeth": 98}
     given = configured("planetary", {}).planetary
     return given.model_copy(update=roles | teeth | {"torque_Nm": torque})
@@ -196,7 +196,7 @@ def driven_set(drive, torque):
 @pytest.mark.parametrize("torque", [150.0, -150.0])
 @pytest.mark.parametrize("drive", DRIVES, ids="-".join)
 def test_meshes_follow_each_other_as_the_teeth_pass_the_planets(drive, torque):
-    given = driven_set(drive, torque)
+    given = set_with(drive, torque)
     teeth = {"sun": 28, "ring": 98, "carrier": -126}
     # Turns per unit of time, positive in the direction in which the planets are numbered.
     turns = {drive[0]: np.sign(torque), drive[1]: 0.0}
@@ -214,7 +214,7 @@ def test_meshes_follow_each_other_as_the_teeth_pass_the_planets(drive, torque):
 @pytest.mark.parametrize("torque", [150.0, -150.0])
 @pytest.mark.parametrize("drive", DRIVES, ids="-".join)
 def test_the_force_of_a_loaded_mesh_pushes_the_gears_apart(drive, torque):
-    given = driven_set(drive, torque)
+    given = set_with(drive, torque)
     across = planetary.mesh_rows(given, 0)
     for gear, outward in (("sun", -1.0), ("ring", 1.0)):
         row = across[f"{gear}_planet_1"]
@@ -255,7 +255,7 @@ def test_numbers_of_meshes_of_different_frequency_are_those_of_their_common_peri
     assert model.catalogue.worded("impacts per mesh period") == "impacts per common mesh period"
     config = configured("two_stage", {"sweep.count": 2})
     found = resonances(Lanes(config))
-    # The first mesh, with 24 teeth on the driven shaft, has two periods in the common one.
+    # The first mesh, with 24 teeth on the input shaft, has two periods in the common one.
     assert found.rpm == pytest.approx(found.hertz * 60.0 / 12.0)
     assert "common period" in found.texts["orders"]
     one = model_of(configured("planetary", {}))

@@ -37,6 +37,9 @@ OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 _OTHER_UNIT = re.compile(r"(?:[\[(] *|_)(mm|in|inch|mil) *[\])]?$", re.IGNORECASE)
 """The end of a heading that names a unit other than um."""
 
+_OF_SINGLE = re.compile(r"f_?pt?(?![A-Za-z])|(?i:.*(?:single|einzel))")
+"""A heading of single deviations, which ISO 1328-1 writes with a small f, in words or symbols."""
+
 _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """Largest sum of all single deviations that rounding in a list can leave."""
 
@@ -74,6 +77,9 @@ def _column(text: str, table: Mapping[str, Any]) -> list[float]:
     if unit := _OTHER_UNIT.search(str(name)):
         rule = f"column {name} is headed in {unit[1]}, and deviations are read in um"
         raise ValueError(rule, "convert the column, and name um in its heading")
+    if _OF_SINGLE.match(str(name)) and "holds" not in table:
+        rule = f"column {name} is headed as single deviations, and cumulative ones are the default"
+        raise ValueError(rule, 'set holds = "single", or holds = "cumulative" if they are added up')
     sheet = CsvText(text, decimal_comma=True, heading=name)
     if isinstance(numbers, str):
         return sheet.numbered_column(name, numbers, "tooth")

@@ -115,7 +115,7 @@ class TrainConfiguration(MachineConfiguration):
         return 2.0 * math.pi * self.common_rate() * speed / 60.0 * 1e-3
 
     def common_rate(self) -> float:
-        """Return the common periods of all meshes in a turn of the driven member."""
+        """Return the common periods of all meshes in a turn of the input member."""
         if self.planetary is not None:
             return planetary.mesh_rate(self.planetary)
         rate = shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
@@ -136,10 +136,10 @@ class TrainConfiguration(MachineConfiguration):
         return shafts.assembled(tables["shaft"], gears, tables["mesh"], self.orders(), effects)
 
     def speeds(self) -> dict[str, Fraction]:
-        """Return the speed of each shaft relative to the driven one."""
-        driven = next((name for name, one in self.shaft.items() if one.uniform), "")
-        driven = driven or next(iter(self.shaft), "")
-        return shafts.speeds_of(self.shaft, self.gear, self.mesh, driven)
+        """Return the speed of each shaft relative to the input shaft."""
+        first = next((name for name, one in self.shaft.items() if one.uniform), "")
+        first = first or next(iter(self.shaft), "")
+        return shafts.speeds_of(self.shaft, self.gear, self.mesh, first)
 
     def orders(self) -> dict[str, int]:
         """Return for each mesh its mesh periods within the common period."""
@@ -245,7 +245,7 @@ def _the_train_is_held(config: TrainConfiguration) -> Iterator[Fault]:
     loose = without_drift(config.machine({}), config.kinds_of_elements.coordinates)
     if loose:
         rule = f"nothing holds {', '.join(loose)}, even with all teeth in contact"
-        remedy = "set uniform = true for the driven shaft"
+        remedy = "set uniform = true for the input shaft"
         where = "planetary" if config.planetary is not None else "shaft"
         yield Fault(where, rule, remedy if where == "shaft" else "give rotation_N_per_um")
 
@@ -263,9 +263,9 @@ def _planets_can_be_assembled(config: TrainConfiguration) -> Iterator[Fault]:
         remedy = f"choose {', '.join(map(str, fitting)) or 'other'} planets, or other teeth"
         yield Fault("planetary.planets", rule + "a multiple of their number", remedy, given.planets)
     yield from _planets_fit(given)
-    tasks = (given.driven, given.fixed, given.loaded)
+    tasks = (given.input, given.fixed, given.loaded)
     if len(set(tasks)) < len(tasks):
-        rule = "driven, fixed and loaded must be three different members"
+        rule = "input, fixed and loaded must be three different members"
         yield Fault("planetary", rule, "give each of sun, ring and carrier one of them", tasks)
 
 

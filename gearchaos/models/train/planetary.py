@@ -16,16 +16,16 @@ from gearchaos.models.train.waves import error_waves, orders_of, stiffness_waves
 
 
 def mesh_rate(given: Planetary) -> float:
-    """Return the mesh periods per revolution of the driven member."""
+    """Return the mesh periods per revolution of the input member."""
     return abs(given.sun_teeth * _turns_of_sun(given))
 
 
 def _turns_of_sun(given: Planetary) -> float:
-    """Return the turns of the sun against the carrier per turn of the driven member."""
+    """Return the turns of the sun against the carrier per turn of the input member."""
     sun, ring = given.sun_teeth, given.ring_teeth
     # Speeds of sun, ring and carrier: sun n_s + ring n_r = (sun + ring) n_c (Willis).
-    speeds = dict.fromkeys(MEMBERS, 0.0) | {given.driven: 1.0}
-    third = next(name for name in MEMBERS if name not in (given.driven, given.fixed))
+    speeds = dict.fromkeys(MEMBERS, 0.0) | {given.input: 1.0}
+    third = next(name for name in MEMBERS if name not in (given.input, given.fixed))
     weights = {"sun": sun, "ring": ring, "carrier": -(sun + ring)}
     speeds[third] = -sum(weights[name] * speeds[name] for name in speeds) / weights[third]
     return speeds["sun"] - speeds["carrier"]
@@ -41,7 +41,7 @@ def torques(given: Planetary) -> dict[str, float]:
         "ring": given.ring_teeth,
         "carrier": -(given.sun_teeth + given.ring_teeth),
     }
-    return {name: given.torque_Nm * part / parts[given.driven] for name, part in parts.items()}
+    return {name: given.torque_Nm * part / parts[given.input] for name, part in parts.items()}
 
 
 def radii(given: Planetary) -> dict[str, float]:
@@ -67,7 +67,7 @@ def force_of_torque(given: Planetary, member: str) -> float:
 def assembled(given: Planetary, effects: Collection[str], *, free: bool = False) -> Assembly:
     """Return the parts of a planetary set.
 
-    ``free``: whether all members can rotate, also the driven and the fixed one.
+    ``free``: whether all members can rotate, also the input and the fixed one.
     """
     parts = Assembly(orders_of([(given.sun_mesh, 1), (given.ring_mesh, 1)]))
     translates = "translation" in effects
@@ -151,7 +151,7 @@ def mesh_phases(given: Planetary, number: int) -> tuple[float, float]:
     They are those of Parker and Lin (2004). The planets are numbered in the direction in which
     rotations are positive. If the sun turns this way, seen from the carrier, its teeth reach a
     later planet later, by the teeth within the angle between both; the ring turns the other way,
-    and its teeth reach it earlier. The driven member turns in the direction of its torque. Where
+    and its teeth reach it earlier. The input member turns in the direction of its torque. Where
     the planet has an even number of teeth, its meshes with sun and ring are half a period apart.
     """
     onward = _turns_of_sun(given) * (-1.0 if given.torque_Nm < 0.0 else 1.0) > 0.0

@@ -29,10 +29,10 @@ TORQUE = 1e3
 
 
 def speeds_of(
-    shafts: Collection[str], gears: Mapping[str, Gear], meshes: Mapping[str, Mesh], driven: str
+    shafts: Collection[str], gears: Mapping[str, Gear], meshes: Mapping[str, Mesh], first: str
 ) -> dict[str, Fraction]:
-    """Return the speed of each shaft that meshes connect with the driven one, relative to it."""
-    speeds = {driven: Fraction(1)}
+    """Return the speed of each shaft that meshes connect with the first one, relative to it."""
+    speeds = {first: Fraction(1)}
     for _ in shafts:
         for mesh in meshes.values():
             one, other = (gears[name] for name in mesh.gears)
@@ -68,7 +68,7 @@ def mesh_orders(
 def first_mesh_rate(
     gears: Mapping[str, Gear], meshes: Mapping[str, Mesh], speeds: Mapping[str, Fraction]
 ) -> Fraction:
-    """Return the mesh periods of the first mesh per revolution of the driven shaft."""
+    """Return the mesh periods of the first mesh per revolution of the input shaft."""
     gear = gears[next(iter(meshes.values())).gears[0]]
     return gear.teeth * speeds[gear.shaft]
 

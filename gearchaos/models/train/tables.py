@@ -39,7 +39,7 @@ class ModelTable(Table):
 class Operation(Table):
     """How the train runs."""
 
-    speed_rpm: float = key("speed of the driven shaft or member", units="rpm", gt=0, le=1e6)
+    speed_rpm: float = key("speed of the input shaft", units="rpm", gt=0, le=1e6)
 
 
 class MeshStiffness(Table):
@@ -89,7 +89,7 @@ class Shaft(Table):
     inertia_kg_m2: float = key("moment of inertia", units="kg m2", example=0.002, gt=0)
     torque_Nm: float = key("external torque in the direction of rotation", units="N m", default=0.0)
     uniform: bool = key(default=False)
-    """whether the shaft rotates uniformly under any load: the driven shaft of a train"""
+    """whether the shaft rotates uniformly under any load: the input shaft of a train"""
     mass_kg: float | None = key("mass", units="kg", default=None, gt=0)
     bearing_N_per_um: float | None = key("bearing stiffness", units="N/um", default=None, gt=0)
     """stiffness of the bearing in both directions; without it the shaft only rotates"""
@@ -169,10 +169,10 @@ class Planetary(Table):
     pressure_angle_deg: float = key(
         "working pressure angle", units="deg", default=20.0, gt=0, lt=60
     )
-    driven: Member = key("the member that rotates uniformly", default="sun")
+    input: Member = key("the member that rotates uniformly", default="sun")
     fixed: Member = key("the member that does not rotate", default="ring")
     loaded: Member = key("the member that a torque holds back", default="carrier")
-    torque_Nm: float = key("torque on the driven member", units="N m", example=100.0)
+    torque_Nm: float = key("torque on the input member", units="N m", example=100.0)
     """a negative torque turns the set the other way"""
     damping_ratio: float = key("damping ratio of the bearings", default=0.02, ge=0, lt=1)
     """damping over critical damping of the bearings at their mean eigenfrequency"""
