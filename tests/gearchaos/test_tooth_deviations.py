@@ -528,7 +528,7 @@ def test_a_column_headed_as_single_deviations_is_not_read_as_cumulative_ones(hea
     path = tmp_path / "gears.toml"
     keys = ('file = "sheet.csv"', f'column = "{heading}"')
     path.write_text(driving(*keys))
-    with pytest.raises(ConfigurationError, match='as single deviations.*set holds = "single"'):
+    with pytest.raises(ConfigurationError, match=r'as single deviations.*set holds = "single"'):
         load_config(path)
     for holds in "single", "cumulative":
         path.write_text(driving(*keys, f'holds = "{holds}"'))
