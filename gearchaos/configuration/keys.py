@@ -48,6 +48,9 @@ class Table(BaseModel):
 NAME = "NAME"
 """Part of the path of a key, in place of the name that a file gives one of several tables."""
 
+MOST_SHOWN = 4
+"""Most keys of a table that a message shows as an example."""
+
 # TOML has lists, the tables have tuples; entries are still checked strictly.
 AS_LIST = Field(strict=False)
 Numbers: TypeAlias = Annotated[tuple[float, ...], AS_LIST]
@@ -132,8 +135,15 @@ class Key:
     @property
     def remedy(self) -> str:
         """The expected value, with an example where there is one."""
-        example = f", such as {self.example}" if self.example else ""
-        return f"expected: {self._described}{example}"
+        example = self.example or self._example_of_a_table
+        return f"expected: {self._described}{f', such as {example}' if example else ''}"
+
+    @property
+    def _example_of_a_table(self) -> str:
+        """The first keys of a table that have examples, in words; empty without such keys."""
+        inner = keys_of(self.tables[0]) if self.tables else ()
+        shown = [f"{one.path} = {one.example}" for one in inner if one.example]
+        return f"[{self.path}] with {', '.join(shown[:MOST_SHOWN])}" if shown else ""
 
 
 _WORDS = {bool: "boolean", int: "integer", float: "float", str: "string", dict: "table"}

@@ -23,6 +23,11 @@ _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}\.[ \t]*+){{64}}")
 """A key with 64 parts, which no configuration has: tomllib takes quadratic time for it."""
 
+_DECIMAL_COMMA = re.compile(
+    r"^[^\n#=\[\"']{1,200}=[ \t]*([+-]?\d{1,20}),(\d{1,20})[ \t]*(?:#|\r?$)", re.M
+)
+"""A number with a decimal comma as the whole value of a key."""
+
 _ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
 """An integer that Python reads but does not print."""
 
@@ -92,6 +97,8 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
     # Besides TOMLDecodeError: endless integers and invalid Unicode raise a plain ValueError.
     except ValueError as error:
         remedy = "write `key = value`, each key once, text in double quotes, tables as [name]"
+        if comma := _DECIMAL_COMMA.search(text):
+            remedy = f"write decimals with a point: {comma[1]}.{comma[2]} for {comma[1]},{comma[2]}"
         raise ConfigurationError(f"{source}: not valid TOML: {error}; {remedy}") from None
 
 

@@ -428,6 +428,26 @@ def test_what_is_not_toml_is_located():
         Configuration.from_toml("title = 'a'\ntitle = 'b'\n", "x.toml")
 
 
+@pytest.mark.parametrize("number", ["0,5", "-12,25  # mm"])
+def test_a_decimal_comma_is_answered_with_the_number_that_was_meant(number):
+    meant = number.split()[0].replace(",", ".")
+    for before in "", "title = 'a'\n[sweep]\n":
+        with pytest.raises(ConfigurationError, match=f"with a point: {re.escape(meant)} for"):
+            Configuration.from_toml(f"{before}from = {number}\nto = 1.0\n", "x.toml")
+    with pytest.raises(ConfigurationError, match="each key once"):
+        Configuration.from_toml("values = [0,5]\ntitle = '0,5'\ntitle = ''\n", "x.toml")
+
+
+def test_a_missing_table_is_shown_with_its_first_keys():
+    with pytest.raises(ConfigurationError) as raised:
+        Configuration.from_toml("", "x.toml")
+    scene, sweep = raised.value.problems
+    assert 'such as [scene] with effects = ["pitch_error",' in scene
+    assert sweep.endswith(
+        'such as [sweep] with parameter = "pitch_error", from = 0.0, to = 15.0, count = 1501'
+    )
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -39,7 +39,7 @@ class ModelTable(Table):
 class Operation(Table):
     """How the train runs."""
 
-    speed_rpm: float = key("speed of the input shaft", units="rpm", gt=0, le=1e6)
+    speed_rpm: float = key("speed of the input shaft", units="rpm", example=3000.0, gt=0, le=1e6)
 
 
 class MeshStiffness(Table):
