@@ -25,7 +25,7 @@ class StabilityLoss(IntEnum):
 STABILITY_LOSS_TEXTS = (
     "period doubling: a real multiplier passes -1",
     "Neimark-Sacker: a complex pair leaves the unit circle",
-    "fold, or symmetry breaking if the orbit continues: a real multiplier reaches +1",
+    "fold, or symmetry breaking where the orbit continues: a real multiplier reaches +1",
     "the orbit ends in one of half its period: a real multiplier reaches +1",
     "the orbit stays stable: the motion jumped to a coexisting one",
     "not confirmed: the next orbit is unstable, but no multiplier is near the unit circle",

@@ -106,9 +106,9 @@ class Tally:
             ),
             (
                 self._mixed,
-                f"{count_of(self._mixed, 'lane')} periodic in the end, but with chaos or another "
-                "motion before within the record (record in the file); the exponent of such a lane "
-                "is that of the orbit",
+                f"{count_of(self._mixed, 'lane')} settled on a periodic motion within the record "
+                "and moved differently before (record in the file); the exponent of such a lane is "
+                "that of the periodic motion",
             ),
             (
                 self._controlled,

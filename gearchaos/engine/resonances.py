@@ -61,7 +61,7 @@ class Resonances(NamedTuple):
                 met, speed = self.rpm, "rpm"
             texts["modes"] = f"eigenfrequencies {_listed(values)} {unit} {where}"
             orders = (f"order {order} at {_listed(met / order)} {speed}" for order in ORDERS)
-            texts["orders"] = f"the {self.exciter} meets them with {'; '.join(orders)}"
+            texts["orders"] = f"resonances with the {self.exciter}: {'; '.join(orders)}"
         if len(self.free):
             unit = self.rate_words if self.hertz is None else "Hz"
             texts["free"] = f"eigenfrequencies {_listed(self.free)} {unit} ({self.free_words})"

@@ -220,9 +220,8 @@ def _sensitive_ones(verdict: Verdict) -> str:
     if not count:
         return ""
     return (
-        f"; {count} of them amplif{'ies' if count == 1 else 'y'} any difference more than "
-        f"{AMPLIFIED:g} times within these periods, so that the path depends on the step, and only "
-        "averages over it do not"
+        f"; in {count} of them any error grows more than {AMPLIFIED:g} times within these periods: "
+        "their path depends on the step, averages over it do not"
     )
 
 

@@ -176,7 +176,7 @@ CONTACT_PART = Part(
     (
         Output("time_driving_@", "share of the recorded time on the driving flank, @"),
         Output("time_back_@", "share of the recorded time on the back flank, @"),
-        Output("time_apart_@", "share of the recorded time between the flanks, @"),
+        Output("time_apart_@", "share of the recorded time without contact, @"),
         Output("impacts_driving_@", "impacts on the driving flank per mesh period, @"),
         Output("impacts_back_@", "impacts on the back flank per mesh period, @"),
         Output("approach_mean_@", "mean speed of approach at an impact, @", scale=Quantity.SPEED),

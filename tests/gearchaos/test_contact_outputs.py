@@ -82,7 +82,7 @@ def test_what_is_reported_of_each_lane_can_be_drawn_over_the_parameter():
     axes = Figure().add_subplot()
     drawn = bifurcation(axes, result, "time_apart_tangential")
     assert drawn.points.get_ydata() == pytest.approx(result["time_apart_tangential"])
-    assert "between the flanks" in " ".join(axes.get_ylabel().split())
+    assert "without contact" in " ".join(axes.get_ylabel().split())
     with pytest.raises(gearchaos.FigureError, match=r"no variable 'nothing'.*approach_largest"):
         bifurcation(axes, result, "nothing")
 

@@ -193,7 +193,7 @@ def test_groups_beyond_all_measure_have_no_eigenfrequencies_and_no_traceback(nam
 
 def test_a_machine_without_gears_has_an_excitation_and_no_mesh():
     found = known(PAN2021.with_name("two_masses.toml"))
-    assert found.texts["orders"].startswith("the excitation meets them with order 1 at 1.41, ")
+    assert found.texts["orders"].startswith("resonances with the excitation: order 1 at 1.41, ")
     assert "(excitation frequency)" in found.texts["orders"]
     # JSON has no NaN; a machine has no static deflection of its own.
     assert "static_deflection" not in found.facts

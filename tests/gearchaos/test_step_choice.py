@@ -106,10 +106,10 @@ def test_chaos_is_reported_and_does_not_ask_for_ever_more_steps():
     assert WANTED < verdict.error[0] < WANTED * verdict.granted[0]
     assert simulation.plan.steps_per_period == 200
     (note,) = simulation.notes
-    assert "1 of them amplifies any difference more than 100 times" in note
+    assert "in 1 of them any error grows more than 100 times" in note
     # The same where the number is given, and the error is one to speak of.
     coarse = prepared(356, 100)
-    (note,) = told(coarse, "amplifies")
+    (note,) = told(coarse, "any error grows")
     assert coarse.plan.steps_per_period == 100 and "off by up to" in note
 
 

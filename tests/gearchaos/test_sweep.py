@@ -117,7 +117,7 @@ def test_a_dry_run_reports_lanes_steps_memory_and_time_and_writes_nothing(tmp_pa
     # motion, bands; status, kind of motion, kind of record.
     assert told.pop("file") == f"about {120 * (8 * 35 + 4 * 4 + 3) / 1000:.1f}kB before compression"
     assert told.pop("modes").startswith("eigenfrequencies 1358, 2364, 3000, 3593, 9122 Hz")
-    assert told.pop("orders").startswith("the mesh meets them with order 1 at 3880, 6755, ")
+    assert told.pop("orders").startswith("resonances with the mesh: order 1 at 3880, 6755, ")
     assert told.pop("deflection").startswith("11.68 um of the mesh under the static load")
     assert told == {
         "output": "gears.h5",

@@ -51,7 +51,6 @@ TERMS = MappingProxyType(
         "mesh frequency": "excitation frequency",
         "driving flank": "upper side",
         "back flank": "lower side",
-        "between the flanks": "between the sides",
     }
 )
 """Terms of a machine without gears: an element pushes where its gap is above or below its range."""
