@@ -145,7 +145,10 @@ def test_a_result_names_coordinates_and_elements(swept):
         (["plot", "machine.h5", "--variable=force_largest_stop", "-o", "f.png"], "f.png"),
         (["plot", "machine.h5", "--stages", "--at=direction=upwards", "-o", "t.png"], "t.png"),
         (["export", "machine.h5", "machine.csv"], "machine.csv"),
-        (["sweep", "machine.toml", "--set=sweep.count=3", "--dry-run"], "resonances with the excitation"),
+        (
+            ["sweep", "machine.toml", "--set=sweep.count=3", "--dry-run"],
+            "resonances with the excitation",
+        ),
     ],
     ids=lambda one: " ".join(one) if isinstance(one, list) else "",
 )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, Status, integrate, jacobian
+from gearchaos_kernels import Plan, Status, evaluate, gaps_along, integrate, jacobian
 from gearchaos_kernels.methods.flow_map import on_demand, store
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.linear.system import LinearSystems
@@ -73,6 +73,23 @@ def test_the_jacobian_is_that_of_the_matrices(compiled, monkeypatch):
             expected[1::2, ::2] = -np.linalg.solve(machine.mass, positions)
             expected[1::2, 1::2] = -np.linalg.solve(machine.mass, rates)
             assert found[lane] == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize("clearance", [True, False])
+def test_gaps_and_forces_of_the_matrices_are_those_of_the_compiled_formulas(clearance, monkeypatch):
+    system = lanes_of([random_machine(seed, 3, 2) for seed in range(4)])
+    if not clearance:
+        system = replace(system, half_clearance=np.zeros((4, 2)), one_sided=(False, False))
+    random = np.random.default_rng(7)
+    states = random.uniform(-2.0, 2.0, (4, 37, 6))
+    found = gaps_along(system, states, 16), evaluate(system, states, 16)
+    for name in "known_gaps", "known_motion":
+        monkeypatch.setattr(LinearSystems, name, getattr(LaneSystem, name))
+    compiled = gaps_along(system, states, 16), evaluate(system, states, 16)
+    assert {*np.unique(compiled[0].flank)} == ({0, 1, 2} if clearance else {1, 2})
+    for ours, theirs in zip(found, compiled, strict=True):
+        for one, other in zip(ours, theirs, strict=True):
+            assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
 
 
 def test_a_system_with_one_coordinate_is_the_oscillator():

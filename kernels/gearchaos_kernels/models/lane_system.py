@@ -308,6 +308,22 @@ class LaneSystem(ABC):
         del stiffnesses
         return None
 
+    def known_gaps(self, states: Floats, steps_per_period: int) -> tuple[NDArray[Any], ...] | None:
+        """Return the fields of `gaps.Gaps`, rates per unit of tau, from matrices that are known.
+
+        None, the default: the compiled formulas of the model are evaluated. ``states``, shape
+        (lanes, samples, states): one step apart, from mesh phase 0.
+        """
+        del states, steps_per_period
+        return None
+
+    def known_motion(
+        self, states: Floats, steps_per_period: int
+    ) -> tuple[NDArray[Any], ...] | None:
+        """Return the fields of `evaluation.Motion`, as `known_gaps` does."""
+        del states, steps_per_period
+        return None
+
     def refuses_series(self) -> str:
         """Return why Taylor series cannot integrate the system, or an empty text."""
         flags = self.flags()

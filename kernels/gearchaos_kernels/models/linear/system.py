@@ -3,13 +3,20 @@
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.linear.model import Linear
+from gearchaos_kernels.models.linear.motion import (
+    accelerations_of,
+    flanks_of,
+    forces_of,
+    gaps_of,
+    moving,
+)
 from gearchaos_kernels.models.linear.structure import (
     MATRICES,
     Structure,
@@ -158,9 +165,12 @@ class LinearSystems(LaneSystem):
             # Without a controller the scene is that of a system without an actuator.
             none = self.control is None or self.actuator is None
             return np.zeros((self.lanes, self.gap.shape[2], 1)) if none else self._direction
-        if name != "motion_rate":
-            matrix: Floats = getattr(self, name)
-            return matrix
+        matrix: Floats = getattr(self, name)
+        return matrix
+
+    @property
+    def motion_rate(self) -> Floats:
+        """The rates of e_j per unit of tau, as parts of the waves, shape (lanes, m, w)."""
         speeds = np.multiply.outer(self.frequency, self.orders)[:, np.newaxis]
         rates = np.zeros_like(self.motion)
         rates[..., 1::2] = speeds * self.motion[..., 2::2]
@@ -200,6 +210,19 @@ class LinearSystems(LaneSystem):
             pushes = self.reaction * strengths[:, np.newaxis]
             result[:, 1::2, first::2] = -free - pushes @ self.gap
         return result
+
+    def known_gaps(self, states: Floats, steps_per_period: int) -> tuple[NDArray[Any], ...]:
+        """Return values, rates and flanks of the gaps along a motion, from the matrices."""
+        motion = moving(self, states, steps_per_period)
+        value, rate = gaps_of(self, motion)
+        return value, rate, flanks_of(self, value), self.half_clearance
+
+    def known_motion(self, states: Floats, steps_per_period: int) -> tuple[NDArray[Any], ...]:
+        """Return forces, contact, accelerations and gaps along a motion, from the matrices."""
+        motion = moving(self, states, steps_per_period)
+        value, rate = gaps_of(self, motion)
+        forces = forces_of(self, motion, value, rate)
+        return forces, flanks_of(self, value), accelerations_of(self, motion, forces), value
 
     def growth_rates(self) -> Floats:
         """Return a bound on the rate of tangent vectors: of the stiffest branch, and of damping."""
