@@ -117,6 +117,8 @@ def _result(source: Path) -> "Result":
 
 def table(found: "BoundarySet") -> list[str]:
     """Return the curves with their points of codimension 2 as lines of a table."""
+    from gearchaos.records.branch import digits_of
+
     names = [one.name for one in found.parameters]
     lines = []
     for number, one in enumerate(found.boundaries):
@@ -137,7 +139,9 @@ def table(found: "BoundarySet") -> list[str]:
                 f"{name} = {value:.10g}" for name, value in zip(names, point.values, strict=True)
             )
             lines.append(f"  {point.kind:35} {place}")
-    return lines or ["no boundary starts from the map or on these lines; give more with --lines"]
+    if not lines:
+        return ["no boundary starts from the map or on these lines; give more with --lines"]
+    return [*lines, *digits_of(found.metadata)]
 
 
 main = Command("boundaries", __doc__, BoundariesOptions, _boundaries).start(__name__)

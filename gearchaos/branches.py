@@ -94,6 +94,8 @@ def _result(source: Path) -> "Result":
 
 def table(found: "BranchSet") -> list[str]:
     """Return the branches with their special points as lines of a table."""
+    from gearchaos.records.branch import digits_of
+
     name = found.parameter.name
     lines = []
     for number, branch in enumerate(found.branches):
@@ -107,7 +109,9 @@ def table(found: "BranchSet") -> list[str]:
             f"  {one.kind:16} {name} = {one.value:.10g}{f'  ({one.flank})' if one.flank else ''}"
             for one in branch.specials
         ]
-    return lines or ["no periodic motion to follow"]
+    if not lines:
+        return ["no periodic motion to follow"]
+    return [*lines, *digits_of(found.metadata)]
 
 
 main = Command("branches", __doc__, BranchesOptions, _branches).start(__name__)

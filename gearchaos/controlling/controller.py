@@ -215,11 +215,11 @@ class Controller:
         periods = whole_number("periods", periods, least=1)
         states = self.starts(starts) if isinstance(starts, int) else np.asarray(starts, float)
         outcome = self.integrate(states, self.system.plan.over(periods))
-        distance = distance_from(
-            self.maps.points, outcome.section, self.scales.max(), self.system.repeats_after, 1
+        repeats, noise = self.system.repeats_after, self.settings.noise
+        distance = distance_from(self.maps.points, outcome.section, self.scales.max(), repeats, 1)
+        return ControlledMotion(
+            outcome.section, outcome.inputs, distance, float(reach_of(noise)), noise > 0.0, repeats
         )
-        reach = float(reach_of(self.settings.noise))
-        return ControlledMotion(outcome.section, outcome.inputs, distance, reach)
 
     def integrate(self, states: Floats, plan: Plan) -> Outcome:
         """Integrate motions with control as a plan of the kernels says.

@@ -104,39 +104,56 @@ def try_controller(controller: Controller, starts: int, periods: int) -> Control
     """Integrate motions from many starts with control, and compare them with those without."""
     begin = controller.starts(starts)
     motion = controller.run(begin, periods)
-    end = motion.section[:, -1]
-    shown = SHOWN_PERIODS * controller.system.repeats_after
+    repeats = controller.system.repeats_after
+    # The excitation begins again where the measured periods begin.
+    tried, shown = -(-periods // repeats) * repeats, SHOWN_PERIODS * repeats
     plan = controller.system.plan._replace(
         transient_periods=0, recorded_periods=shown, section_points=0, history_periods=shown
     )
-    best = int(np.argmin(motion.distance[:, -1]))
+    best = [int(np.argmin(motion.distance[:, -1]))]
     free = kernels.integrate(controller.system.equations, begin[:1], plan)
-    held = controller.integrate(end[best : best + 1], plan)
+    # From its start: a state alone has neither the estimate of the controller nor its noise.
+    held = kernels.integrate(
+        _controlled(controller, starts).of(np.array(best)),
+        begin[best],
+        plan._replace(transient_periods=tried),
+    )
+    alone = controller.equations.of(np.zeros(starts, dtype=np.intp))
     return ControlTrial(
         controller,
         motion,
         free.history[0],
         held.history[0],
-        _measures(controller, begin, controlled=False),
-        _measures(controller, end, controlled=True),
+        _measures(controller, alone, begin, 0),
+        _measures(controller, _controlled(controller, starts), begin, tried),
     )
 
 
-def _measures(controller: Controller, states: Floats, *, controlled: bool) -> dict[str, float]:
-    """Return means over lanes of contact, loads and transmission error, by name."""
+def _controlled(controller: Controller, lanes: int) -> kernels.LaneSystem:
+    """Return lanes with the controller."""
+    alone = controller.equations.of(np.zeros(lanes, dtype=np.intp))
+    return alone.controlled(controller.control(lanes))
+
+
+def _measures(
+    controller: Controller, system: kernels.LaneSystem, begin: Floats, transient: int
+) -> dict[str, float]:
+    """Return means over lanes of contact, loads and transmission error, by name.
+
+    ``begin`` (lanes, states): states at the beginning of ``transient`` mesh periods that come
+    before those over which motions are compared.
+    """
     run = plan_run(controller.system.config)
     whole = controller.system.repeats_after
     periods = -(-COMPARED_PERIODS // whole) * whole
     plan = controller.system.plan._replace(
-        transient_periods=0,
+        transient_periods=transient,
         recorded_periods=periods,
         section_points=0,
         loads=True,
         contact=controller.system.equations.clearance,
     )
-    system = controller.equations.of(np.zeros(len(states), dtype=np.intp))
-    control = controller.control(len(states)) if controlled else None
-    outcome = kernels.integrate(system.controlled(control), states, plan)
+    outcome = kernels.integrate(system, begin, plan)
     found: dict[str, Any] = dict(run.lanes.model.loads(outcome.loads, system))
     for number, element in enumerate(run.elements if plan.contact else ()):
         summary = contact_summary(outcome.contact[:, number], periods)

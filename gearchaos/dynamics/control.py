@@ -9,17 +9,21 @@ J_j is the Jacobian of the map over mesh period j, b_j its derivative by the inp
 of the tangent frame of the kernels.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
 from gearchaos_kernels import Control, LaneSystem, Plan, integrate
+from numpy.typing import NDArray
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.errors import ConfigurationError
 
 PROBE = 1e-3
 """Length of the tangent vector with which the input of the tangent frame is 1."""
+
+MOST_DOUBLINGS = 50
+"""Largest number of doublings for a Riccati equation; each squares what is left of the error."""
 
 UNCONTROLLABLE = 1e-6
 """Largest share of the input in a mode that counts as none; see `controllability`."""
@@ -180,7 +184,7 @@ def lqr_gain(maps: PeriodMaps, state_weight: float, input_weight: float) -> Floa
     a, b = _cyclic(maps.jacobians), _cyclic(maps.responses[:, :, np.newaxis])
     periods, states = maps.points.shape
     weights = input_weight * np.eye(periods)
-    cost = scipy.linalg.solve_discrete_are(a, b, state_weight * np.eye(periods * states), weights)
+    cost = riccati(a, b, state_weight * np.eye(periods * states), weights)
     gain = np.linalg.solve(weights + b.T @ cost @ b, b.T @ cost @ a)
     return np.array([gain[n, n * states : (n + 1) * states] for n in range(periods)])
 
@@ -223,7 +227,7 @@ def estimate_correction(
     c = np.kron(np.eye(periods), np.eye(states)[measured])
     spread = np.kron(np.eye(periods), np.diag(disturbance**2))
     variance = np.kron(np.eye(periods), np.diag(noise**2))
-    predicted = scipy.linalg.solve_discrete_are(a.T, c.T, spread, variance)
+    predicted = riccati(a.T, c.T, spread, variance)
     gains = np.linalg.solve((c @ predicted @ c.T + variance).T, c @ predicted.T).T
     signals = len(measured)
     return np.array(
@@ -232,6 +236,47 @@ def estimate_correction(
             for n in range(periods)
         ]
     )
+
+
+def riccati(a: NDArray[Any], b: NDArray[Any], state: NDArray[Any], inputs: NDArray[Any]) -> Floats:
+    """Return the stabilising solution X of a discrete Riccati equation, shape (states, states).
+
+    X = A' X A - A' X B (R + B' X B)^-1 B' X A + Q, by structure-preserving doubling (Chu, Fan and
+    Lin 2005). It converges quadratically, also where multipliers are so small that the eigenvectors
+    of the equation, from which `scipy.linalg.solve_discrete_are` builds X, cannot be ordered.
+
+    Parameters
+    ----------
+    a, b : array, shape (states, states) and (states, inputs)
+        The matrices A and B of x' = A x + B u.
+    state, inputs : array, shape (states, states) and (inputs, inputs)
+        The symmetric weights Q and R.
+
+    Raises
+    ------
+    ConfigurationError
+        If no gain stabilises the system.
+
+    Examples
+    --------
+    >>> riccati(np.array([[2.0]]), np.eye(1), np.eye(1), np.eye(1)).round(6)
+    array([[4.236068]])
+    """
+    identity, solution = np.eye(len(a)), state
+    reach = b @ np.linalg.solve(inputs, b.T)
+    for _ in range(MOST_DOUBLINGS):
+        with np.errstate(all="ignore"):
+            step = np.linalg.solve(identity + reach @ solution, np.hstack([a, reach]))
+            moved, spread = step[:, : len(a)], step[:, len(a) :]
+            change = moved.T @ solution @ a
+            a, reach, solution = a @ moved, reach + a @ spread @ a.T, solution + change
+        if not np.isfinite(solution).all():
+            break
+        if np.abs(change).max() <= np.finfo(float).eps * np.abs(solution).max():
+            symmetric: Floats = (solution + solution.T) / 2.0
+            return symmetric
+    rule = "no gain stabilises the orbit or its estimate: the Riccati equation has no solution"
+    raise ConfigurationError(f"{rule}; change another input, or measure other states")
 
 
 def _cyclic(blocks: Floats) -> Floats:

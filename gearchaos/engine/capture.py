@@ -5,10 +5,14 @@ import numpy as np
 
 from gearchaos.arrays import Array, Integers
 from gearchaos.engine.run_plan import RunPlan
-from gearchaos.records.control import CAPTURED, NOT_CAPTURED, distance_from, reach_of
-
-HELD = 16
-"""Excitation periods at the end over which a captured lane stays on the orbit."""
+from gearchaos.records.control import (
+    CAPTURED,
+    HELD_PERIODS,
+    NOT_CAPTURED,
+    distance_from,
+    on_orbit,
+    reach_of,
+)
 
 EFFORTS = ("largest", "mean", "recorded")
 """Endings of the names of efforts."""
@@ -39,10 +43,11 @@ def control_arrays(
         repeats,
         1 - points,
     )
-    noise, last = controllers.noise_of(lanes, values), slice(-HELD * repeats, None)
-    held = (distance[:, last] <= reach_of(noise)[:, np.newaxis]).all(axis=1)
-    # With noise the motion may be near the orbit by chance; without, an input may be exactly 0.
-    held &= (noise == 0.0) | (outcome.inputs[:, last] != 0.0).all(axis=1)
+    noise = controllers.noise_of(lanes, values)
+    # A sample of a sweep may be shorter.
+    last = slice(-min(HELD_PERIODS * repeats, points, outcome.inputs.shape[1]), None)
+    there = on_orbit(distance[:, last], outcome.inputs[:, last], reach_of(noise), noise > 0.0)
+    held = there.all(axis=1)
     state[(state == NOT_CAPTURED) & held] = CAPTURED
     size = np.abs(outcome.inputs)
     size[outcome.status != kernels.Status.OK] = np.nan

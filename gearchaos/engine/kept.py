@@ -19,7 +19,7 @@ from gearchaos.outputs import catalogue, names
 from gearchaos.outputs.entries import Part
 from gearchaos.outputs.listing import Details, for_each
 from gearchaos.outputs.variable import Variable
-from gearchaos.records.contact import CONTACT_STATES, contact_summary
+from gearchaos.records.contact import CONTACT_STATES, DIVERGED, contact_summary
 from gearchaos.records.control import CAPTURE_MEANINGS
 from gearchaos.records.difference import difference
 from gearchaos.records.dimension import kaplan_yorke
@@ -155,8 +155,8 @@ def recorded_quantities(
         kept |= run.lanes.model.loads(outcome.loads, system)
     kept |= state_summary(outcome, run.plan, run.lanes.model.signals[:1])
     for values in kept.values():
-        if values.dtype != np.uint8:
-            values[outcome.status != kernels.Status.OK] = np.nan
+        of_kinds = values.dtype == np.uint8
+        values[outcome.status != kernels.Status.OK] = DIVERGED if of_kinds else np.nan
     return kept
 
 

@@ -190,7 +190,8 @@ def _thinned(result: Result, variable: str, most: int) -> tuple[Array, Array]:
     rows = rows[:, -max(1, most // len(rows)) :]
     every = -(-rows.size // most)
     x, y = np.repeat(lanes.parameter, rows.shape[1])[::every], rows.ravel()[::every]
-    there = np.isfinite(y)
+    # Motions that grow exceed the largest number of the page.
+    there = np.abs(y) < np.finfo(np.float32).max
     return x[there].astype(np.float32), y[there].astype(np.float32)
 
 

@@ -33,6 +33,7 @@ MOST_SHOWN = 4
 """Largest number of maps on a page where none is chosen."""
 """Variables of the panels of a page, if the result has them."""
 
+DIVERGED = "diverged"  # Kind, and legend entry, of lanes without a whole record.
 NO_VALUE = "no value"  # Legend entry of lanes that did not diverge but have no number.
 
 NUMBERS = "YlGn"
@@ -147,7 +148,7 @@ def _draw_cells(
         numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
         image = _number_cells(axes, grid.edges, numbers, variable == LARGEST_EXPONENT)
         none, ended = np.isnan(numbers), grid.cells(result[STATUS]) != 0
-        masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
+        masks = {DIVERGED: none & ended, NO_VALUE: none & ~ended}
         looks = {name: look_of(name) for name in masks}
     if type(image) is AxesImage:
         # A PDF then holds the cells themselves, not the pixels they cover on paper.
@@ -252,10 +253,14 @@ def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, An
         kinds, names = motion_kinds(result)
         return kinds, {name: look_of(name) for name in names}
     flags = result.variables[variable].flags
-    shades = mpl.colormaps[NUMBERS](np.linspace(0.0, 1.0, len(flags)))
-    looks = [{"facecolor": shade, "edgecolor": "0.55"} for shade in shades]
-    names = [flag.replace("_", " ") for flag in flags]
-    return result[variable], dict(zip(names, looks, strict=True))
+    coloured = [flag for flag in flags if flag != DIVERGED]
+    shades = mpl.colormaps[NUMBERS](np.linspace(0.0, 1.0, len(coloured)))
+    looks = {DIVERGED: look_of(DIVERGED)}
+    looks |= {
+        flag: {"facecolor": shade, "edgecolor": "0.55"}
+        for flag, shade in zip(coloured, shades, strict=True)
+    }
+    return result[variable], {flag.replace("_", " "): looks[flag] for flag in flags}
 
 
 def _number_cells(

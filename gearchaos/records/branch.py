@@ -1,6 +1,7 @@
 """Branches of periodic orbits over a parameter, as they are computed, stored and drawn."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from gearchaos.arrays import Complex, Floats, Mask
 
@@ -27,6 +28,23 @@ LOST = "no orbit found however short the step"
 IN_ERRORS = "lost in the errors of the method: take shorter steps, or flow maps"
 BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST, IN_ERRORS)
 """Reasons why a branch ends."""
+
+STEPPED = "rk4"
+"""The method whose orbits depend on its steps."""
+
+
+def digits_of(metadata: Mapping[str, Any]) -> list[str]:
+    """Return what a table of special points says of their digits: nothing for an exact method.
+
+    ``metadata``: that of the branches or boundaries, with ``method`` and ``steps_per_period``.
+    """
+    if metadata.get("method") != STEPPED:
+        return []
+    steps = int(metadata["steps_per_period"])
+    return [
+        f"these are orbits of RK4 with {steps} steps per period; next to grazings fewer digits "
+        f"hold than are printed: compare with integration.steps_per_period = {2 * steps}"
+    ]
 
 
 class SpecialPoint(NamedTuple):

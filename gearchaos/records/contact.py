@@ -4,11 +4,12 @@ import numpy as np
 
 from gearchaos.arrays import Array, Floats
 
-HELD, SINGLE_SIDED, DOUBLE_SIDED, FREE = range(4)
-CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free")
+HELD, SINGLE_SIDED, DOUBLE_SIDED, FREE, DIVERGED = range(5)
+CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free", "diverged")
 """Meanings of the values of ``contact_state``.
 
-The element never separates, hits one flank, hits both flanks, or has no contact.
+The element never separates, hits one flank, hits both flanks, or has no contact; or the lane has no
+whole record.
 """
 
 

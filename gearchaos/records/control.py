@@ -15,6 +15,9 @@ CLOSEST_REACH = 1e-6
 NOISE_REACH = 30.0
 """Largest distance of a captured motion with noise, in standard deviations of the noise."""
 
+HELD_PERIODS = 16
+"""Excitation periods at the end over which a captured motion stays on the orbit."""
+
 CAPTURE_MEANINGS = ("not captured", "captured", "no orbit", "no gain", "off")
 """Meanings of the values of ``capture``; in lanes with one of the last three no input is used."""
 NOT_CAPTURED, CAPTURED, NO_ORBIT, NO_GAIN, OFF = range(len(CAPTURE_MEANINGS))
@@ -32,27 +35,58 @@ class ControlledMotion(NamedTuple):
     distance : array, shape (starts, mesh periods)
         Largest deviation of a state from the target orbit, as a share of its largest state.
     within : float
-        Largest distance of a motion that counts as captured, in the same measure.
+        Largest distance of a motion on the orbit, in the same measure.
+    noisy : bool
+        Whether what the controller measures has noise.
+    repeats : int
+        Mesh periods after which the excitation repeats.
     """
 
     section: Floats
     inputs: Floats
     distance: Floats
     within: float
+    noisy: bool = False
+    repeats: int = 1
 
     @property
     def captured(self) -> Mask:
-        """Whether each motion is on the orbit at the end, shape (starts,)."""
-        last: Mask = self.distance[:, -1] <= self.within
-        return last
+        """Whether each motion stays on the orbit in the last periods, shape (starts,)."""
+        last = self._on_orbit[:, -HELD_PERIODS * self.repeats :]
+        stays: Mask = np.all(last, axis=1)
+        return stays
 
     @property
     def capture_time(self) -> Counts:
         """Mesh periods until each motion stays on the orbit, shape (starts,); -1 if it does not."""
-        away = ~(self.distance <= self.within)
+        away = ~self._on_orbit
         left = np.argmax(away[:, ::-1], axis=1)
         times = np.where(away.any(axis=1), away.shape[1] - left, 0)
         return np.where(self.captured, times, -1)
+
+    @property
+    def _on_orbit(self) -> Mask:
+        """Whether each motion is on the orbit in every mesh period."""
+        return on_orbit(self.distance, self.inputs, np.array([self.within]), self.noisy)
+
+
+def on_orbit(distance: Floats, inputs: Floats, within: Floats, noisy: bool | Mask) -> Mask:
+    """Return whether motions are on their orbit in every mesh period, shape (lanes, periods).
+
+    With noise a motion may be near the orbit by chance: its input must then be used as well.
+
+    Parameters
+    ----------
+    distance, inputs : array, shape (lanes, periods)
+        See `ControlledMotion`.
+    within : array, shape (lanes,) or (1,)
+        Largest distance of a motion on the orbit.
+    noisy : bool or array of bool, shape (lanes,)
+        Whether measurements have noise. Without it, an input may be exactly 0.
+    """
+    near: Mask = distance <= within[:, np.newaxis]
+    used: Mask = ~np.reshape(noisy, (-1, 1)) | (inputs != 0.0)
+    return near & used
 
 
 def reach_of(noise: float | Floats) -> Floats:

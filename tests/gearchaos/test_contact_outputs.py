@@ -9,7 +9,9 @@ import gearchaos
 from gearchaos import load_config
 from gearchaos.engine.kept import variables_of
 from gearchaos.figures import bifurcation
+from gearchaos.models import Configuration
 from gearchaos.records.contact import CONTACT_STATES, contact_summary
+from gearchaos.results.reading.ensembles import motion_shares
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation
@@ -96,3 +98,47 @@ def test_contact_is_unknown_where_nothing_is_crossed():
 def test_a_plan_keeps_it_only_where_it_is_asked_for():
     assert not Plan(200, 0, 1, 0).contact
     assert "contact_state_tangential" not in gearchaos.run(load_config(PAN2021, SHORT)).variables
+
+
+GROWING = """
+[groups]
+mesh_frequency = 0.8
+load = 0.1
+damping_ratio = 0.01
+base_helix_angle_deg = 0.0
+half_backlash = 1.0
+stiffness_cosine = [0.9]
+pitch_error_amplitude = 0.01
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+[start]
+kind = "random"
+count = 6
+spread = 3.0
+[sweep]
+parameter = "stiffness_variation_scale"
+values = [0.0, 1.2, 3.0]
+[outputs]
+contact = true
+[integration]
+steps_per_period = 100
+transient_periods = 200
+recorded_periods = 200
+"""
+"""Motions that stay in contact, that grow while they hit both flanks, and that diverge."""
+
+
+def test_lanes_without_a_whole_record_have_no_kind_of_contact():
+    result = gearchaos.run(Configuration.from_toml(GROWING))
+    state, status = result["contact_state_tangential"], result["status"]
+    assert (status[2] != 0).all() and (status[0] == 0).all()
+    flags = result.variables["contact_state_tangential"].flags
+    assert ((state == flags.index("diverged")) == (status != 0)).all()
+
+
+def test_motions_that_grow_lose_contact_though_their_time_apart_rounds_to_nothing():
+    result = gearchaos.run(Configuration.from_toml(GROWING))
+    grown = np.abs(result["section_delta_5"][1]).max(axis=1) > 1e9
+    assert grown.any() and (result["impacts_back_tangential"][1][grown] > 0.0).all()
+    counted = motion_shares(result).apart
+    assert counted.counts[1] == np.sum(result["status"][1] == 0)

@@ -12,9 +12,11 @@ from gearchaos_kernels import Plan, integrate
 
 import gearchaos
 from gearchaos.controlling.controller import Controller
-from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controllable
+from gearchaos.controlling.trial import try_controller
+from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controllable, riccati
 from gearchaos.dynamics.controllers import ControlSettings
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration
 
 from .commands import SMALL, run_module
 
@@ -22,6 +24,42 @@ SWEEPS = Path(__file__).parents[2] / "sweeps"
 PUBLISHED = {0.05: (0.915, 347), 0.1: (1.0, 164), 0.2: (1.0, 144), 0.3: (1.0, 140)}
 """Share of 1000 chaotic starts that each limit captured in an independent computation, and the
 median time in mesh periods."""
+
+
+TEETH = """
+[pair]
+teeth = [7, 20]
+normal_module_mm = 2.0
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 15.0
+face_width_mm = 15.0
+profile_shift = [0.5, 0.0]
+[operation]
+torque_Nm = 0.6
+speed_rpm = 20000.0
+[mesh]
+mean_stiffness_N_per_um_mm = 12.0
+normal_backlash_um = 40.0
+damping_ratio = 0.02
+stiffness = { shape = "trapezoid" }
+[pitch_error]
+kind = "teeth"
+smoothing = 0.5
+mean_um = 2.0
+driving = { cumulative_um = [0.0, 3.0, 5.5, 4.0, 7.0, 2.0, -1.0] }
+[groups]
+pitch_error = 4.0
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+[sweep]
+parameter = "operation.speed_rpm"
+values = [69000.0]
+[integration]
+steps_per_period = 400
+transient_periods = 700
+recorded_periods = 700
+"""
+"""A pair whose excitation repeats after seven mesh periods."""
 
 
 @cache
@@ -114,6 +152,22 @@ def test_the_cost_of_a_small_deviation_is_that_of_the_riccati_equation():
     assert paid == pytest.approx(deviation @ cost @ deviation, rel=1e-4)
 
 
+@pytest.mark.parametrize("states", [2, 10, 34])
+def test_the_riccati_equation_is_solved_where_multipliers_are_large_or_tiny(states):
+    random = np.random.default_rng(states)
+    a, b = random.normal(size=(states, states)) / np.sqrt(states), np.eye(states)[:, :2]
+    for factor in (1e-12, 0.3, 1.4):
+        # Some modes decay within a period, as they do over the mesh periods of a long orbit.
+        matrix = factor * a @ np.diag(np.logspace(0, -12, states))
+        found = riccati(matrix, b, np.eye(states), 3.0 * np.eye(2))
+        gain = np.linalg.solve(3.0 * np.eye(2) + b.T @ found @ b, b.T @ found @ matrix)
+        closed = matrix - b @ gain
+        assert found == pytest.approx(np.eye(states) + matrix.T @ found @ closed, rel=1e-11)
+        assert np.abs(np.linalg.eigvals(closed)).max() < 1.0
+    with pytest.raises(ConfigurationError, match="no gain stabilises"):
+        riccati(np.diag([1.5, 0.5]), np.array([[0.0], [1.0]]), np.eye(2), np.eye(1))
+
+
 @pytest.mark.parametrize("limit", PUBLISHED)
 def test_chaotic_starts_are_captured_as_often_and_as_fast_as_known(limit):
     found = controller(limit=limit)
@@ -130,6 +184,35 @@ def test_chaotic_starts_are_captured_as_often_and_as_fast_as_known(limit):
     assert times[middle - reach] <= median <= times[middle + reach]
     assert np.abs(motion.inputs).max() <= limit * controller().load
     assert np.abs(motion.inputs[motion.captured, -1]).max() < 1e-5 * controller().load
+
+
+def test_a_motion_that_noise_puts_near_the_orbit_by_chance_is_not_captured():
+    # With this limit the controller changes nothing, and 30 deviations reach over all of chaos.
+    motion = controller(noise=0.05, limit=1e-4).run(60, 400)
+    near = motion.distance <= motion.within
+    assert near[:, -1].any() and not motion.captured.any()
+    assert (motion.capture_time == -1).all()
+    # One period away from the orbit in the last sixteen, or without input, is enough.
+    on = motion._replace(distance=np.zeros((3, 40)), inputs=np.ones((3, 40)))
+    on.distance[0, -16], on.inputs[1, -16], on.distance[2, -17] = 1.0 + on.within, 0.0, 2.0
+    assert on.captured.tolist() == [False, False, True]
+    assert on._replace(noisy=False).captured.tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize("periods", [210, 213])
+def test_measures_after_a_trial_are_those_of_the_orbit_at_any_phase_of_the_excitation(periods):
+    system = gearchaos.System(Configuration.from_toml(TEETH), operation_speed_rpm=69_000.0)
+    orbit = system.orbit()
+    assert system.repeats_after == 7 and abs(orbit.multipliers[0]) > 2.0
+    settings = ControlSettings(limit=0.3, measured=("delta_5", "delta_5_rate"))
+    trial = try_controller(Controller(system, orbit, settings), 4, periods)
+    assert trial.motion.captured.all()
+    plan = system.plan._replace(transient_periods=0, recorded_periods=7, section_points=0)
+    alone = integrate(system.equations, orbit.point[np.newaxis], plan._replace(loads=True))
+    assert trial.after["mesh_force_largest_tangential"] == pytest.approx(
+        alone.loads[0, 0, 0], rel=1e-5
+    )
+    assert trial.before["mesh_force_largest_tangential"] < 0.97 * alone.loads[0, 0, 0]
 
 
 def test_noise_spreads_the_state_as_the_lyapunov_equation_says():

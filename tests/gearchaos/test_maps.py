@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 
 from gearchaos.errors import FigureError, FileError
 from gearchaos.figures import map_page, parameter_map
 from gearchaos.figures.maps import _number_cells
-from gearchaos.figures.stages import SHADES
+from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.models.gear_pair.outputs import CATALOGUE
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.plot import main
@@ -175,7 +175,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
     assert page.axes[0].get_gridspec().get_geometry() == shape
     titles = [axes.get_title(loc="left").split("$ ", 1)[1] for axes in page.axes]
     assert titles[0] == "Motion and period" and titles[1].startswith("Largest Lyapunov exponent")
-    flags = [flag.replace("_", " ") for flag in CONTACT_STATES]
+    flags = [flag.replace("_", " ") for flag in CONTACT_STATES if flag != "diverged"]
     assert legend_of(page.axes[2]) == flags
     for axes in page.axes:
         assert [line.get_xdata() for line in axes.lines] == [[1200.0, 1200.0]] * 2
@@ -250,3 +250,14 @@ def test_what_no_map_can_be_is_reported(path, arguments, message, capsys):
 def test_a_motion_that_nobody_labelled_cannot_be_drawn():
     with pytest.raises(FileError, match=r"outputs\.motion = true"):
         drawn("motion", result_over(ERRORS, SPEEDS, labelled=False))
+
+
+def test_lanes_that_diverged_look_alike_in_all_maps():
+    state = np.where(MOTION == 4, CONTACT_STATES.index("diverged"), MOTION % 4)
+    data = {name: RESULT[name] for name in RESULT} | {"contact_state_tangential": state}
+    result = Result(RESULT.axes, [*RESULT.variables.values()], data, {}, {})
+    axes = Figure().subplots()
+    parameter_map(axes, result, "contact_state_tangential")
+    assert legend_of(axes)[-1] == "diverged"
+    patch = axes.get_legend().get_patches()[-1]
+    assert patch.get_facecolor() == Patch(**look_of("diverged")).get_facecolor()

@@ -14,6 +14,8 @@ from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
 
+IMPACTS = "impacts_driving_", "impacts_back_"
+"""Beginnings of names of impacts per mesh period; the name of an element follows."""
 TIME_APART = "time_apart_"
 TEETH_APART = "time_apart_tangential"
 """The time for which the teeth of a gear pair are apart."""
@@ -124,13 +126,16 @@ def motion_shares(result: Result) -> MotionShares:
 def _sizes_of_loss(result: Result) -> list[str]:
     """Return the names of variables: some value is positive where a lane loses contact.
 
-    They are the times apart: of the teeth of a gear pair, which its axial clearance does not part,
-    or of all elements of a machine. Without them, crossings of any clearance count.
+    They are times apart and impacts: of the teeth of a gear pair, which its axial clearance does
+    not part, or of all elements of a machine. A fast motion may be apart for a time that rounds to
+    0. Without them, crossings of any clearance count.
     """
     if TEETH_APART in result:
-        return [TEETH_APART]
-    apart = [name for name in result if name.startswith(TIME_APART)]
-    return apart or ([CROSSINGS] if CROSSINGS in result else [])
+        element = TEETH_APART.removeprefix(TIME_APART)
+        sizes = [TEETH_APART, *(f"{side}{element}" for side in IMPACTS)]
+    else:
+        sizes = [name for name in result if name.startswith((TIME_APART, *IMPACTS))]
+    return [name for name in sizes if name in result] or [CROSSINGS] * (CROSSINGS in result)
 
 
 class Basin(NamedTuple):
