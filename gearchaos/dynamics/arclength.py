@@ -60,6 +60,10 @@ def is_exact(plan: Plan) -> bool:
     return METHODS[plan.method].always_resolved
 
 
+SHORTER = 1e-6
+"""Return distance after a part of the period below which an orbit is one of a shorter period."""
+
+
 class CurvePoint(NamedTuple):
     """A point of a curve.
 
@@ -380,6 +384,20 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
     tangents = here.tangent + 2.0 * step * square + 3.0 * step**2 * cube
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     return ahead + step**2 * square + step**3 * cube, tangents
+
+
+def repeats_sooner(section: Floats, scale: Floats) -> bool:
+    """Whether an orbit is one of a shorter period.
+
+    ``section``: its section points in successive periods of the excitation, (periods, states);
+    ``scale``: scales of the states (states,).
+    """
+    periods = len(section)
+    return any(
+        float(np.max(np.abs(section - np.roll(section, shorter, axis=0)) / scale)) < SHORTER
+        for shorter in range(1, periods // 2 + 1)
+        if periods % shorter == 0
+    )
 
 
 def stalls(points: Sequence[OnCurve], least: tuple[int, float]) -> bool:

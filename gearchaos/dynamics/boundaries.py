@@ -63,6 +63,9 @@ JUMP = 0.1
 SETTLED = 2e-10
 """Distance of two successive trials below which the next one would change less than `LOCATED`."""
 
+ROUNDING = 1e-7
+"""Distance of a multiplier from 1 that may be rounding; see `branch_specials.ROUNDING`."""
+
 _WITH_PAIR = (FOLD_NEIMARK_SACKER, FLIP_NEIMARK_SACKER, GRAZING_NEIMARK_SACKER)
 
 
@@ -360,7 +363,11 @@ def _located_between(
 ) -> Following[list[tuple[str, OnBoundary]]]:
     """Search kind and point of the points of codimension 2 between two points, in order."""
     before, after = (_tests(equations.kind, at) for at in (one, other))
-    names = [name for name, value in before.items() if value * after[name] < 0.0]
+    names = [
+        name
+        for name, value in before.items()
+        if value * after[name] < 0.0 and not (name == GRAZING_FOLD and _stays(one, other))
+    ]
     points = yield from together([_located(equations, one, other, name) for name in names])
     found = []
     for name, point in zip(names, points, strict=True):
@@ -368,10 +375,23 @@ def _located_between(
             name in _WITH_PAIR and not _has_complex_pair(_others(equations.kind, point.multipliers))
         ):
             continue
+        if name == CUSP and not _turns_back(one, point, other):
+            continue
         found.append((name, point))
     chord = other.place - one.place
     found.sort(key=lambda item: float((item[1].place - one.place) @ chord))
     return found
+
+
+def _stays(one: OnBoundary, other: OnBoundary) -> bool:
+    """Whether a multiplier stays 1 from one point to another, so that its sign is rounding."""
+    nearest = [float(np.min(np.abs(at.multipliers - 1.0))) for at in (one, other)]
+    return min(nearest) < ROUNDING
+
+
+def _turns_back(one: OnBoundary, cusp: OnBoundary, other: OnBoundary) -> bool:
+    """Whether both parameters turn back at a point between two others, as at a cusp."""
+    return bool((cusp.shares - one.shares) @ (other.shares - cusp.shares) < 0.0)
 
 
 def _others(kind: str, multipliers: Complex) -> Complex:

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.dynamics.arclength import cubic, extended, stalls
+from gearchaos.dynamics.arclength import cubic, extended, repeats_sooner, stalls
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CORNER,
     NO_EXTREME,
+    SHORT_STEPS,
     STRONG_RESONANCE_11,
     STRONG_RESONANCE_12,
 )
@@ -132,14 +133,14 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
         before = len(points)
         for number, trial in enumerate(trials):
             at_edge = leaves and number == len(trials) - 1
-            longer = _joined(half, halves, trial, at_edge)
+            longer = _joined(equations, half, halves, trial, at_edge)
             if longer is None:
                 break
             step = min(longer, LONGEST)
             if half.end or half.met is not None:
                 return
         if not half.end and stalls(points, STALLED):
-            half.end = _why_lost(equations, points[-1])
+            half.end = HALVING if _nearly_half(points[-1]) else SHORT_STEPS
         elif len(points) == before:
             here, step = points[-1], step / 2.0
             if trials[0] is not None and _passes_half(here, trials[0]):
@@ -149,7 +150,7 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
 
 
 def _joined(
-    half: _Half, halves: list[_Half], trial: OnBoundary | None, at_edge: bool
+    equations: Equations, half: _Half, halves: list[_Half], trial: OnBoundary | None, at_edge: bool
 ) -> float | None:
     """Join a point to a half unless another half is met before it; return the next step.
 
@@ -157,6 +158,8 @@ def _joined(
     """
     points, here = half.points, half.points[-1]
     if trial is None or trial.tangent @ here.tangent < SMOOTH or _passes_half(here, trial):
+        return None
+    if repeats_sooner(trial.section, equations.scale):
         return None
     length = float(np.linalg.norm(trial.place - here.place))
     if at_edge and length < SAME_PLACE:

@@ -45,6 +45,13 @@ MOST_GRAZINGS = 16
 ROUNDED = 1e-8
 """Distance up to which two changes of the impacts are one grazing."""
 
+ROUNDING = 1e-7
+"""Size of a test function below which its sign is that of rounding.
+
+Where a linear motion loses stability, orbits of a whole range of amplitudes exist at one value of
+the parameter: along them a multiplier stays 1, and the parameter does not change.
+"""
+
 MOST_TRIALS = 80
 """Largest number of points with which a special point is located."""
 
@@ -165,6 +172,8 @@ def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
     before, after = _test_functions(one), _test_functions(other)
     for kind in before:
         if before[kind] * after[kind] >= 0.0:
+            continue
+        if min(abs(before[kind]), abs(after[kind])) < ROUNDING and kind in (FOLD, BRANCH_POINT):
             continue
         if kind == BRANCH_POINT and before[FOLD] * after[FOLD] < 0.0:
             # A multiplier passes +1 at every fold.

@@ -14,6 +14,7 @@ import numpy as np
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import (
     FIRST_STEP,
+    SHORTER,
     SHORTEST_STEP,
     Curve,
     CurvePoint,
@@ -94,9 +95,6 @@ Where errors of a method fold a curve at the size of its jumps, it leads nowhere
 
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
-
-SHORTER = 1e-6
-"""Return distance after half the period below which an orbit is that of half the period."""
 
 AMPLITUDES = SIDEWAYS * np.array([1.0, -1.0, 0.3, -0.3, 0.1, 0.03, 0.01])
 """Distances at which a doubled branch is searched, one after the other."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import METHODS, steps_taken
 
-from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
+from gearchaos.arrays import Complex, Floats, Integers, Mask
+from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way, repeats_sooner
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
@@ -18,9 +18,9 @@ from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import Found, run, together
-from gearchaos.engine.branching import BranchSearch, flank_name
+from gearchaos.engine.branching import BranchSearch, flank_name, require_range
 from gearchaos.engine.kept import variables_of
-from gearchaos.engine.map_changes import JUMP, Changes, MapChange, changes_of
+from gearchaos.engine.map_changes import DOUBLES, JUMP, Changes, MapChange, changes_of
 from gearchaos.engine.map_lines import Line, Ranges
 from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
@@ -114,6 +114,7 @@ def find_boundaries(
         raise ConfigurationError(
             f"{name}: nothing lies between two values of {whole[0]}; sweep another parameter"
         )
+    require_range(config, name)
     over = Ranges.of(config)
     search = _BoundarySearch(
         over, plan_run(for_continuation(_small(config, PARAMETERS))), longest, result
@@ -173,8 +174,15 @@ class _Begun(NamedTuple):
     @property
     def within(self) -> bool:
         """Whether the point lies within both ranges."""
-        shares = np.zeros(0) if self.start is None else self.start.shares
+        shares = np.full(1, np.nan) if self.start is None else self.start.shares
         return bool(np.all((shares >= 0.0) & (shares <= 1.0)))
+
+    @property
+    def repeats_sooner(self) -> bool:
+        """Whether the point is an orbit of a shorter period, whose boundaries are others."""
+        if self.start is None:
+            return False
+        return repeats_sooner(self.start.section, self.equations.scale)
 
 
 class _BoundarySearch:
@@ -284,10 +292,15 @@ class _BoundarySearch:
         """Follow boundaries through some points, and from changes that are beside none."""
         before, left = len(self.found), self.left
         chosen = left.spread(self.fixed) if left.flank.size else np.zeros(0, dtype=np.intp)
-        jumps = left.flank[chosen] == JUMP
+        leading = self._multipliers(left.of(chosen))
+        jumps = (left.flank[chosen] == JUMP) | _double_elsewhere(left.flank[chosen], leading)
         jumping, changing = left.of(chosen[jumps]), left.of(chosen[~jumps])
         self._follow(
-            [*searches, *self._from_branches(self._across(jumping)), *self._from_changes(changing)]
+            [
+                *searches,
+                *self._from_branches(self._across(jumping)),
+                *self._from_changes(changing, leading[~jumps]),
+            ]
         )
         open_still = np.ones(left.flank.size, dtype=bool)
         open_still[chosen] = False
@@ -295,6 +308,8 @@ class _BoundarySearch:
             same = left.flank == one.equations.flank
             if one.equations.kind != GRAZING:
                 same |= left.flank == JUMP
+            if one.equations.kind == PERIOD_DOUBLING:
+                same |= left.flank == DOUBLES
             open_still &= ~(same & (left.period == one.period) & left.beside(one.shares))
         self.left = left.of(open_still)
 
@@ -310,20 +325,24 @@ class _BoundarySearch:
         traced = _traced_together(searches)
         return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
 
-    def _from_changes(self, changes: Changes) -> list[Following["_Begun"]]:
-        """Return the searches of boundaries next to changes of a map."""
-        some = [*changes.each()]
+    def _multipliers(self, changes: Changes) -> Complex:
+        """Return the multipliers of the motions next to changes of a map, (changes, states)."""
         requests = [
             Passing(
                 self._equations(one.period, FOLD),
                 np.append(one.state / self.scale, one.shares),
             )
-            for one in some
+            for one in changes.each()
         ]
+        found = [passed.multipliers for passed in passed_of(requests)]
+        return np.array(found, dtype=np.complex128).reshape(len(requests), self.scale.size)
+
+    def _from_changes(self, changes: Changes, multipliers: Complex) -> list[Following["_Begun"]]:
+        """Return the searches of boundaries next to changes of a map; see `_multipliers`."""
         return [
             self._from_change(one, kind)
-            for one, passed in zip(some, passed_of(requests), strict=True)
-            for kind in _kinds(one, passed.multipliers)
+            for one, values in zip(changes.each(), multipliers, strict=True)
+            for kind in _kinds(one, values)
         ]
 
     def _equations(self, period: int, kind: str, flank: int = -1) -> Equations:
@@ -366,7 +385,7 @@ class _BoundarySearch:
         for one, is_held in zip(begun, held, strict=True):
             if one.start is None and one.special is not None:
                 self.found.append(unstarted(one.equations, one.guess, one.special))
-            if one.start is not None and not is_held and one.within:
+            if not is_held and one.within and not one.repeats_sooner:
                 new.append(one)
         before = len(self.found)
         turning = [one for one in new if one.equations.kind == NEIMARK_SACKER]
@@ -385,8 +404,10 @@ class _BoundarySearch:
                 starts.append((one.equations, [one.start]))
         traced = run(together([tracing(*one) for one in starts]), passed_of)
         for boundary in (one for some in traced for one in some):
-            # Orbits of longer periods are the same at each of their section points.
-            middle = boundary.points[len(boundary.points) // 2]
+            # Orbits of longer periods are the same at each of their section points. Points crowd
+            # next to grazings, so that the middle is that of the length.
+            positions = boundary.positions
+            middle = boundary.points[int(np.argmin(np.abs(positions - positions[-1] / 2.0)))]
             if not run(self._held(_Begun(boundary.equations, middle)), passed_of):
                 self.found.append(boundary)
 
@@ -515,6 +536,17 @@ def _through(curve: Curve, guess: Floats) -> Finding[TracedBranch | None]:
     if start is None or not 0.0 <= start.share <= 1.0:
         return None
     return (yield from tracing_branch(curve, start, located=APPROXIMATE))
+
+
+def _double_elsewhere(flank: Integers, multipliers: Complex) -> Mask:
+    """Return where the period doubles next to a motion whose leading multiplier is no negative one.
+
+    The doubling lies further away than a corrected guess reaches: the branch is traced to it.
+    ``flank``: see `MapChange`; ``multipliers``: (changes, states).
+    """
+    leading = multipliers[:, 0]
+    elsewhere: Mask = (flank == DOUBLES) & ~((leading.imag == 0.0) & (leading.real < 0.0))
+    return elsewhere
 
 
 def _kinds(change: MapChange, values: Complex) -> list[str]:

@@ -27,7 +27,7 @@ from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.models import swept_values
+from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
@@ -58,6 +58,16 @@ class _Motion(NamedTuple):
     share: float
     section: Floats
     period: int
+
+
+def require_range(config: Configuration, name: str) -> None:
+    """Raise ConfigurationError if a sweep has one value only; ``name``: the result in messages."""
+    for table, sweep in config.sweeps.items():
+        if np.ptp(swept_values(sweep)) == 0.0:
+            raise ConfigurationError(
+                f"{name}: {table} has one value of {sweep.parameter}, and orbits are followed over "
+                "a range; give a sweep of two values or more"
+            )
 
 
 def find_branches(
@@ -101,6 +111,7 @@ def find_branches(
             f"{name}: nothing lies between two values of {parameter}; sweep another parameter"
         )
     values = np.unique(swept_values(config.sweep))
+    require_range(config, name)
 
     def systems(at: Floats) -> LaneSystem:
         return system_of(config, {parameter: at}, config.needed_effects)

@@ -13,6 +13,9 @@ from gearchaos.results.reading.result import Result
 JUMP = -2
 """In place of a flank: the motion jumps to another one of the same period."""
 
+DOUBLES = -3
+"""In place of a flank: the motion in the other cell has twice the period."""
+
 PARTS = 8
 """Parts of each range; in each part of the map, one change of every kind is a start at a time."""
 
@@ -23,7 +26,7 @@ class MapChange(NamedTuple):
     Attributes
     ----------
     flank : int
-        Number of the flank whose impacts change, -1 if the period changes, or `JUMP`.
+        Number of the flank whose impacts change, -1 if the period changes, or `JUMP` or `DOUBLES`.
     period : int
         Its period in excitation periods.
     state : array, shape (states,)
@@ -157,7 +160,7 @@ def changes_of(
     for number in (0, 1):
         one, other = _neighbours(number)
         differs = period[one] != period[other]
-        found.append(_rows(-1, number, differs, periodic))
+        found.append(_marked(_rows(-1, number, differs, periodic), period))
         found.append(_rows(JUMP, number, _jumps(number, period, sections), periodic))
         for flank, count in enumerate(counts):
             more = np.abs(count[one] - count[other]) > 0.5
@@ -182,6 +185,16 @@ def changes_of(
         place[lanes],
         place[beside],
     )
+
+
+def _marked(rows: Integers, period: Integers) -> Integers:
+    """Mark the changes in which the period doubles; only a period doubling explains them."""
+    ours, theirs = (
+        period[rows[:, second], rows[:, first], rows[:, 6]] for first, second in ((2, 3), (4, 5))
+    )
+    marked = rows.copy()
+    marked[theirs == 2 * ours, 0] = DOUBLES
+    return marked
 
 
 def _sections(result: Result) -> Floats:

@@ -40,6 +40,9 @@ LINES: dict[str, dict[str, Any]] = {
 }
 """Line of each kind of boundary."""
 
+WIDTHS = {1: 1.0, 2: 0.7}
+"""Width of the line of each period in points; longer ones are thinner."""
+
 MARKERS: dict[str, dict[str, Any]] = {
     CUSP: {"marker": "^", "color": BLACK},
     STRONG_RESONANCE_11: {"marker": "o", "color": BLACK},
@@ -53,6 +56,10 @@ MARKERS: dict[str, dict[str, Any]] = {
     GRAZING_NEIMARK_SACKER: {"marker": "*", "color": VERMILION},
 }
 """Marker and colour of each kind of point of codimension 2."""
+
+MARGIN, NARROWEST = 0.03, 0.02
+"""Margin beside curves, as a share of the axis, and the least length of an axis relative to its
+largest value."""
 
 _HALO: Any = {"linewidth": 2.0, "foreground": "white", "alpha": 0.8}
 
@@ -107,7 +114,7 @@ def boundary_overlay(found: BoundarySet, parameters: Sequence[str] | None = None
     lines, points = list[OverlaidLine](), list[OverlaidPoint]()
     for one in found.boundaries:
         kind = f"{one.kind}, period {one.period}" if several else one.kind
-        look = {"linewidth": 1.0 if one.period == 1 else 0.7, **LINES[one.kind]}
+        look = {"linewidth": WIDTHS.get(one.period, 0.4), **LINES[one.kind]}
         x, y = one.values[:, order].T
         lines.append(OverlaidLine(kind, x, y[:, np.newaxis], look))
         for point in one.points:
@@ -125,6 +132,15 @@ def boundary_overlay(found: BoundarySet, parameters: Sequence[str] | None = None
         *(kind for kind in POINT_KINDS if kind in marked),
     ]
     return Overlay(lines, points, kinds)
+
+
+def _with_margin(values: Floats) -> tuple[float, float]:
+    """Return limits of an axis; values that differ by rounding only fill a small part of it."""
+    low, high = float(values.min()), float(values.max())
+    width = max(high - low, NARROWEST * max(abs(low), abs(high)), 1e-12)
+    aside = (1.0 + 2.0 * MARGIN) * width / 2.0
+    middle = (low + high) / 2.0
+    return middle - aside, middle + aside
 
 
 def _order(found: BoundarySet, parameters: Sequence[str] | None) -> list[int]:
@@ -197,9 +213,9 @@ def boundaries_page(
         axes = figure.subplots()
         values = np.concatenate([one.values for one in found.boundaries])
         (x, y), (low, high) = values.T, between
-        axes.set_xlim(x.min() if low is None else low, x.max() if high is None else high)
-        margin = 0.03 * (float(np.ptp(y)) or 1.0)
-        axes.set_ylim(y.min() - margin, y.max() + margin)
+        first, last = _with_margin(x)
+        axes.set_xlim(first if low is None else low, last if high is None else high)
+        axes.set_ylim(*_with_margin(y))
         handles = draw_boundaries(axes, found)
         axes.set(xlabel=label_of(found.parameters[0]), ylabel=label_of(found.parameters[1], 34))
         legend_below(figure, handles, str(found.metadata.get("title", "")) or None, 2)

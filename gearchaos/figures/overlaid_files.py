@@ -1,15 +1,25 @@
 """Files that are drawn over the figure of a result; those of another sweep are refused."""
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FigureError
 from gearchaos.figures.lanes import map_axes
+from gearchaos.outputs.names import axis_name
 from gearchaos.results.files.boundary_file import BoundarySet
 from gearchaos.results.files.boundary_reader import read_boundaries
 from gearchaos.results.files.branch_file import BranchSet
 from gearchaos.results.files.branch_reader import read_branches
 from gearchaos.results.reading.result import Result, section_variables
+
+OF_THE_RUN = (
+    *("title", "unusual", "start", "sweep", "second_sweep"),
+    *("integration", "outputs", "control"),
+)
+"""Tables of a configuration that do not describe the machine."""
 
 
 def branches_over(
@@ -35,6 +45,8 @@ def branches_over(
             f"--branches {path}: holds branches over {found.parameter.name}, and the diagram is "
             f"over {axis}; give the branches of this sweep"
         )
+    for result in results:
+        _require_same_machine(f"--branches {path}", found.metadata, result)
     if units == "physical":
         raise FigureError(
             "--branches: branches are dimensionless; leave --units physical out, or the branches"
@@ -54,12 +66,51 @@ def boundaries_over(path: str | Path, result: Result, units: str | None = None) 
             f"{' and '.join(one.name for one in found.parameters)}, and the map is over "
             f"{' and '.join(axes)}; give the boundaries of this map"
         )
+    _require_same_machine(f"--boundaries {path}", found.metadata, result)
     if units == "physical":
         raise FigureError(
             "--boundaries: the curves are over the swept parameters as configured; leave --units "
             "physical out, or the boundaries"
         )
     return found
+
+
+def _require_same_machine(name: str, metadata: Mapping[str, Any], result: Result) -> None:
+    """Raise FigureError if a file was computed from another machine than a result.
+
+    ``metadata``: that of the file, whose configurations are compared; ``name``: the file in
+    messages.
+    """
+    theirs, ours = _keys_of_machine(metadata), _keys_of_machine(result.metadata)
+    for key in theirs.keys() & ours.keys():
+        fixed = result.fixed.get(axis_name(key.removeprefix("groups.")), ours[key])
+        if theirs[key] != fixed:
+            raise FigureError(
+                f"{name}: was computed with {key} = {theirs[key]}, and the figure is of "
+                f"{key} = {fixed}; give the file that was computed from this result"
+            )
+    for axis, value in result.fixed.items():
+        for key in theirs.keys() - ours.keys():
+            if axis_name(key.removeprefix("groups.")) == axis and theirs[key] != value:
+                raise FigureError(
+                    f"{name}: was computed with {key} = {theirs[key]}, and the figure is of "
+                    f"{key} = {value}; give the file that was computed at this value"
+                )
+
+
+def _keys_of_machine(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of the machine in the configuration of a file by dotted path, and values."""
+    try:
+        tables = tomllib.loads(str(metadata.get("configuration_resolved", "")))
+    except tomllib.TOMLDecodeError:
+        return {}
+    flat = flat_tables({name: table for name, table in tables.items() if name not in OF_THE_RUN})
+    swept = {
+        sweep.get("parameter")
+        for name in ("sweep", "second_sweep")
+        if isinstance(sweep := tables.get(name), dict)
+    }
+    return {key: value for key, value in flat.items() if key.removeprefix("groups.") not in swept}
 
 
 def of_map(axis: str) -> str:

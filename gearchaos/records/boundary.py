@@ -63,6 +63,7 @@ POINT_MEANINGS = {
 
 CORNER = "meets a grazing, where it has a corner"
 NO_EXTREME = "the gap has no extreme near the flank any more"
+SHORT_STEPS = "its steps became too short, as next to a grazing"
 NOT_STARTED = "the special point of a branch is no point of a boundary"
 BOUNDARY_ENDS = (
     EDGE,
@@ -73,6 +74,7 @@ BOUNDARY_ENDS = (
     LOST,
     CORNER,
     NO_EXTREME,
+    SHORT_STEPS,
     NOT_STARTED,
 )
 """Reasons why a boundary ends."""

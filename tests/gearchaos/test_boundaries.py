@@ -16,7 +16,10 @@ import gearchaos
 from gearchaos.dynamics.boundary_equations import Equations
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
+from gearchaos.engine.bounding import find_boundaries
 from gearchaos.engine.running import one_thread
+from gearchaos.figures.boundaries import boundaries_page
+from gearchaos.figures.overlaid_files import boundaries_over
 from gearchaos.models.registry import system_of
 from gearchaos.records.boundary import BOUNDARY_ENDS, CUSP
 from gearchaos.records.branch import FOLD, GRAZING, PERIOD_DOUBLING
@@ -361,3 +364,113 @@ def test_a_damaged_file_is_refused(files):
     (folder / "damaged.h5").write_bytes(whole)
     with pytest.raises(gearchaos.GearchaosError, match="damaged"):
         read_boundaries(folder / "damaged.h5")
+
+
+DOUBLED_AGAIN = """
+[pair]
+teeth = [25, 41]
+normal_module_mm = 3.0
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 0.0
+face_width_mm = 20.0
+[operation]
+torque_Nm = 60.0
+[mesh]
+mean_stiffness_N_per_um_mm = 14.0
+half_backlash_um = 40.0
+damping_ratio = 0.05
+stiffness = { shape = "fourier", cosine_N_per_um_mm = [-2.5, -0.8], sine_N_per_um_mm = [0.0, 0.0] }
+[pitch_error]
+amplitude_um = 5.0
+phase_deg = 90.0
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+[start]
+kind = "contact"
+carry = "upwards"
+[sweep]
+parameter = "operation.speed_rpm"
+from = 5500.0
+to = 8000.0
+count = 11
+[second_sweep]
+parameter = "operation.torque_Nm"
+values = [20.0, 30.0, 40.0, 50.0]
+[integration]
+steps_per_period = 200
+transient_periods = 200
+recorded_periods = 60
+[outputs]
+contact = true
+section_points = 16
+"""
+
+
+@pytest.fixture(scope="module")
+def doubled_again():
+    result = gearchaos.run(gearchaos.models.Configuration.from_toml(DOUBLED_AGAIN))
+    return find_boundaries(result, longest=2)
+
+
+def test_a_doubling_far_from_the_cells_of_its_motion_is_found(doubled_again):
+    # Doublings of the orbit of period 2 at 30 N m, from branches along the speed, where shooting by
+    # an independent integrator has multipliers of -0.99999.
+    across = [
+        np.interp(30.0, values[:, 1][order], values[:, 0][order])
+        for one in doubled_again.boundaries
+        if (one.kind, one.period) == (PERIOD_DOUBLING, 2)
+        for at in [int(np.argmax(one.values[:, 1]))]
+        for values in (one.values[: at + 1], one.values[at:])
+        for order in [np.argsort(values[:, 1])]
+        if np.ptp(values[:, 1]) > 5.0
+    ]
+    for speed in 6713.09, 6939.58:
+        assert min(abs(one - speed) for one in across) < 2.0
+
+
+def test_orbits_on_boundaries_have_no_shorter_period_and_cusps_turn_back(doubled_again):
+    for one in doubled_again.boundaries:
+        if one.period == 2 and one.values.shape[0] > 1:
+            apart = np.abs(one.section[:, 0] - one.section[:, 1]).max(axis=1)
+            assert apart.min() > 1e-7
+        for point in one.points:
+            if point.kind == CUSP:
+                at = int(np.argmin(np.abs(one.arclength - point.arclength)))
+                sizes = np.ptp(one.values, axis=0)
+                before, after = np.diff(one.values[at - 1 : at + 2] / sizes, axis=0)
+                assert before @ after < 0.0
+
+
+def test_a_map_of_one_value_has_no_boundaries():
+    given = DOUBLED_AGAIN.replace("values = [20.0, 30.0, 40.0, 50.0]", "values = [20.0]")
+    result = gearchaos.run(gearchaos.models.Configuration.from_toml(given))
+    with pytest.raises(gearchaos.GearchaosError, match="second_sweep has one value of operation"):
+        find_boundaries(result, "one.h5")
+
+
+def test_curves_of_another_machine_are_not_drawn(files, found, tmp_path):
+    metadata = dict(found.metadata)
+    text = str(metadata["configuration_resolved"])
+    changed = text.replace("clearance.mesh.stiffness = 1.0", "clearance.mesh.stiffness = 1.5")
+    assert changed != text
+    other = found._replace(metadata=metadata | {"configuration_resolved": changed})
+    write_boundaries(tmp_path / "other.h5", other)
+    result = gearchaos.open_result(files[0] / "map.h5")
+    with pytest.raises(gearchaos.FigureError, match=r"mesh.stiffness = 1\.5, and the figure"):
+        boundaries_over(tmp_path / "other.h5", result)
+
+
+def test_a_curve_at_one_value_is_drawn_as_a_straight_line(found):
+    one = next(one for one in found.boundaries if one.kind == FOLD)
+    values = np.column_stack([0.65836 + 1e-12 * np.sin(np.arange(20.0)), np.linspace(1.0, 2.0, 20)])
+    count = len(values)
+    straight = one._replace(
+        values=values,
+        arclength=np.arange(float(count)),
+        section=np.repeat(one.section[:1], count, axis=0),
+        multipliers=np.repeat(one.multipliers[:1], count, axis=0),
+        points=(),
+    )
+    page = boundaries_page(found._replace(boundaries=(straight,)))
+    low, high = page.axes[0].get_xlim()
+    assert high - low > 0.01 and low < values[:, 0].min() and values[:, 0].max() < high

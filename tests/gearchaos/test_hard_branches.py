@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 import gearchaos
 from gearchaos.engine.branching import find_branches
+from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration
 from gearchaos.records.branch import EDGE, GRAZING, PERIOD_DOUBLING
 
 MASS = """
@@ -151,3 +153,59 @@ def test_a_maximum_that_leaves_a_flank_while_another_meets_it_is_seen(second, lo
     assert len(found) == 2
     assert found[0] == pytest.approx(-found[1], abs=1e-9)
     assert found[1] > 1e-4
+
+
+PARAMETRIC = """
+[groups]
+stiffness_variation_scale = 0.8
+base_helix_angle_deg = 0.0
+half_backlash = 1.0
+load = 0.6
+damping_ratio = 0.04
+pitch_error_amplitude = 0.02
+pitch_error_phase_deg = 90.0
+stiffness_cosine = [-0.3, -0.1]
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+[start]
+kind = "contact"
+[sweep]
+parameter = "mesh_frequency"
+from = 1.85
+to = 2.15
+count = 13
+[integration]
+steps_per_period = 200
+transient_periods = 300
+recorded_periods = 60
+[outputs]
+contact = true
+section_points = 16
+"""
+"""A pair whose period doubles while its teeth stay in contact, so that its motion is linear."""
+
+
+def test_orbits_of_every_amplitude_at_one_value_are_no_folds():
+    found = find_branches(gearchaos.run(Configuration.from_toml(PARAMETRIC)), longest=2)
+    doublings = [
+        one.value
+        for branch in found.branches
+        for one in branch.specials
+        if one.kind == PERIOD_DOUBLING and branch.period == 1
+    ]
+    assert doublings == pytest.approx([1.909459266, 2.084802766], abs=2e-6)
+    # A branch rises from each at one value of the frequency, up to the first separation.
+    for value in doublings:
+        (doubled,) = (
+            one
+            for one in found.branches
+            if one.period == 2 and np.sum(np.abs(one.value - value) < 1e-8) > 3
+        )
+        assert [one.kind for one in doubled.specials] == [GRAZING]
+
+
+def test_a_sweep_of_one_value_has_no_branches():
+    given = PARAMETRIC.replace("from = 1.85\nto = 2.15\ncount = 13", "values = [1.9]")
+    result = gearchaos.run(Configuration.from_toml(given))
+    with pytest.raises(ConfigurationError, match="sweep has one value of mesh_frequency"):
+        find_branches(result, "one.h5")

@@ -3,7 +3,7 @@
 import numpy as np
 
 import gearchaos
-from gearchaos.engine.map_changes import changes_of
+from gearchaos.engine.map_changes import DOUBLES, changes_of
 from gearchaos.outputs.variable import Variable
 
 
@@ -50,6 +50,13 @@ def test_longer_periods_are_no_starts_and_no_change_is_between_equal_cells():
     assert of_map(np.full((5, 6), 2)).flank.size == 0
     half = np.repeat([[1, 1, 1, 2, 2, 2]], 5, axis=0)
     assert cells(of_map(half)) == {((2, row), (3, row)) for row in range(5)}
+
+
+def test_a_motion_beside_one_of_twice_its_period_is_marked():
+    period = np.repeat([[1, 1, 2, 2, 0, 1]], 5, axis=0)
+    found = of_map(period)
+    assert cells(found.of(found.flank == DOUBLES)) == {((1, row), (2, row)) for row in range(5)}
+    assert cells(found.of(found.flank == -1)) == {((5, row), (4, row)) for row in range(5)}
 
 
 def test_other_impacts_change_the_motion_of_equal_periods():
