@@ -8,7 +8,7 @@
 
 import gearchaos_kernels as kernels
 import numpy as np
-from gearchaos_kernels import Control, Outcome, Plan
+from gearchaos_kernels import Control, LaneSystem, Outcome, Plan
 
 from gearchaos.arguments import finite_number, instance, one_of, whole_number
 from gearchaos.arrays import Complex, Floats
@@ -163,6 +163,27 @@ class Controller:
             limit=np.full(lanes, self._limit), seeds=seeds
         )
 
+    def lanes(self, count: int) -> LaneSystem:
+        """Return lanes of the machine with the controller.
+
+        Parameters
+        ----------
+        count : int
+            Number of lanes. The noise of each has its own seed.
+
+        Returns
+        -------
+        LaneSystem
+            The equations of motion, with `control`.
+
+        Examples
+        --------
+        >>> controller.lanes(3).lanes
+        3
+        """
+        control = self.control(count)
+        return self.equations.of(np.zeros(count, dtype=np.intp)).controlled(control)
+
     def starts(self, count: int) -> Floats:
         """Return states of the motion without control, after the configured transient.
 
@@ -244,9 +265,7 @@ class Controller:
         >>> outcome.inputs.shape
         (2, 10)
         """
-        lanes = len(states)
-        system = self.equations.of(np.zeros(lanes, dtype=np.intp))
-        return kernels.integrate(system.controlled(self.control(lanes)), states, plan)
+        return kernels.integrate(self.lanes(len(states)), states, plan)
 
 
 def _checked(given: ControlSettings, system: System) -> ControlSettings:

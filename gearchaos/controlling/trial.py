@@ -110,29 +110,22 @@ def try_controller(controller: Controller, starts: int, periods: int) -> Control
     plan = controller.system.plan._replace(
         transient_periods=0, recorded_periods=shown, section_points=0, history_periods=shown
     )
-    best = [int(np.argmin(motion.distance[:, -1]))]
+    best = np.array([np.argmin(motion.distance[:, -1])])
+    controlled = controller.lanes(starts)
+    alone = controller.equations.of(np.zeros(starts, dtype=np.intp))
     free = kernels.integrate(controller.system.equations, begin[:1], plan)
     # From its start: a state alone has neither the estimate of the controller nor its noise.
     held = kernels.integrate(
-        _controlled(controller, starts).of(np.array(best)),
-        begin[best],
-        plan._replace(transient_periods=tried),
+        controlled.of(best), begin[best], plan._replace(transient_periods=tried)
     )
-    alone = controller.equations.of(np.zeros(starts, dtype=np.intp))
     return ControlTrial(
         controller,
         motion,
         free.history[0],
         held.history[0],
         _measures(controller, alone, begin, 0),
-        _measures(controller, _controlled(controller, starts), begin, tried),
+        _measures(controller, controlled, begin, tried),
     )
-
-
-def _controlled(controller: Controller, lanes: int) -> kernels.LaneSystem:
-    """Return lanes with the controller."""
-    alone = controller.equations.of(np.zeros(lanes, dtype=np.intp))
-    return alone.controlled(controller.control(lanes))
 
 
 def _measures(

@@ -346,12 +346,17 @@ def along_the_way(states: int) -> Floats:
 
 
 class OnCurve(Protocol):
-    """A point of a curve: its place, and the unit vector in which the curve is followed."""
+    """A point of a curve: its place, and the unit vector in which the curve is followed.
+
+    ``halfway``: how far the orbit is from itself after half the period, empty for odd periods.
+    """
 
     @property
     def place(self) -> Floats: ...
     @property
     def tangent(self) -> Floats: ...
+    @property
+    def halfway(self) -> Floats: ...
 
 
 def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats]:
@@ -384,6 +389,11 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
     tangents = here.tangent + 2.0 * step * square + 3.0 * step**2 * cube
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     return ahead + step**2 * square + step**3 * cube, tangents
+
+
+def passes_half(here: OnCurve, trial: OnCurve) -> bool:
+    """Whether the orbit of half the period lies between two points: beyond it, phases swap."""
+    return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
 
 
 def repeats_sooner(section: Floats, scale: Floats) -> bool:

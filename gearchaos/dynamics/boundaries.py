@@ -22,6 +22,7 @@ from gearchaos.dynamics.boundary_following import (
 )
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.boundary_tests import Reference
+from gearchaos.dynamics.branch_specials import ROUNDING_OF_TESTS
 from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
@@ -62,9 +63,6 @@ JUMP = 0.1
 
 SETTLED = 2e-10
 """Distance of two successive trials below which the next one would change less than `LOCATED`."""
-
-ROUNDING = 1e-7
-"""Distance of a multiplier from 1 that may be rounding; see `branch_specials.ROUNDING`."""
 
 _WITH_PAIR = (FOLD_NEIMARK_SACKER, FLIP_NEIMARK_SACKER, GRAZING_NEIMARK_SACKER)
 
@@ -386,7 +384,7 @@ def _located_between(
 def _stays(one: OnBoundary, other: OnBoundary) -> bool:
     """Whether a multiplier stays 1 from one point to another, so that its sign is rounding."""
     nearest = [float(np.min(np.abs(at.multipliers - 1.0))) for at in (one, other)]
-    return min(nearest) < ROUNDING
+    return min(nearest) < ROUNDING_OF_TESTS
 
 
 def _turns_back(one: OnBoundary, cusp: OnBoundary, other: OnBoundary) -> bool:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.dynamics.arclength import cubic, extended, repeats_sooner, stalls
+from gearchaos.dynamics.arclength import cubic, extended, passes_half, repeats_sooner, stalls
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
@@ -143,7 +143,7 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
             half.end = HALVING if _nearly_half(points[-1]) else SHORT_STEPS
         elif len(points) == before:
             here, step = points[-1], step / 2.0
-            if trials[0] is not None and _passes_half(here, trials[0]):
+            if trials[0] is not None and passes_half(here, trials[0]):
                 half.end = HALVING if _nearly_half(here) else ""
             elif step < SHORTEST:
                 half.end = _why_lost(equations, here)
@@ -157,7 +157,7 @@ def _joined(
     None if the point does not continue the half.
     """
     points, here = half.points, half.points[-1]
-    if trial is None or trial.tangent @ here.tangent < SMOOTH or _passes_half(here, trial):
+    if trial is None or trial.tangent @ here.tangent < SMOOTH or passes_half(here, trial):
         return None
     if repeats_sooner(trial.section, equations.scale):
         return None
@@ -185,11 +185,6 @@ def _bends(here: OnBoundary, trial: OnBoundary) -> bool:
     if not min(lengths) > 0.0:
         return True
     return bool(np.linalg.norm(chord / lengths[0] - mean / lengths[1]) > BEND)
-
-
-def _passes_half(here: OnBoundary, trial: OnBoundary) -> bool:
-    """Whether the orbit of half the period lies between two points: beyond it, phases swap."""
-    return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
 
 
 def _nearly_half(here: OnBoundary) -> bool:

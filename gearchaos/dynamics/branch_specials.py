@@ -45,7 +45,7 @@ MOST_GRAZINGS = 16
 ROUNDED = 1e-8
 """Distance up to which two changes of the impacts are one grazing."""
 
-ROUNDING = 1e-7
+ROUNDING_OF_TESTS = 1e-7
 """Size of a test function below which its sign is that of rounding.
 
 Where a linear motion loses stability, orbits of a whole range of amplitudes exist at one value of
@@ -173,7 +173,8 @@ def _changes_of_sign(one: CurvePoint, other: CurvePoint) -> Iterator[_Sought]:
     for kind in before:
         if before[kind] * after[kind] >= 0.0:
             continue
-        if min(abs(before[kind]), abs(after[kind])) < ROUNDING and kind in (FOLD, BRANCH_POINT):
+        least = min(abs(before[kind]), abs(after[kind]))
+        if kind in (FOLD, BRANCH_POINT) and least < ROUNDING_OF_TESTS:
             continue
         if kind == BRANCH_POINT and before[FOLD] * after[FOLD] < 0.0:
             # A multiplier passes +1 at every fold.

@@ -21,6 +21,7 @@ from gearchaos.dynamics.arclength import (
     along_the_way,
     cubic,
     extended,
+    passes_half,
     stalls,
 )
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
@@ -459,13 +460,8 @@ def _boldness(here: CurvePoint, trial: CurvePoint) -> float:
 
 
 def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
-    """Whether the orbit of half the period lies between two points or is the second one.
-
-    Beyond it, phases swap.
-    """
-    return trial.half_return < SHORTER or bool(
-        here.halfway.size and here.halfway @ trial.halfway <= 0.0
-    )
+    """Whether the orbit of half the period lies between two points or is the second one."""
+    return trial.half_return < SHORTER or passes_half(here, trial)
 
 
 def _before(end: CurvePoint, points: Sequence[CurvePoint]) -> list[CurvePoint]:

@@ -326,16 +326,22 @@ class _BoundarySearch:
         return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
 
     def _multipliers(self, changes: Changes) -> Complex:
-        """Return the multipliers of the motions next to changes of a map, (changes, states)."""
+        """Return the multipliers of the motions next to changes of a map, (changes, states).
+
+        NaN where impacts change or the motion jumps: its multipliers are not needed.
+        """
+        found = np.full((changes.flank.size, self.scale.size), np.nan, dtype=np.complex128)
+        (needed,) = np.nonzero((changes.flank == -1) | (changes.flank == DOUBLES))
         requests = [
             Passing(
                 self._equations(one.period, FOLD),
                 np.append(one.state / self.scale, one.shares),
             )
-            for one in changes.each()
+            for one in changes.of(needed).each()
         ]
-        found = [passed.multipliers for passed in passed_of(requests)]
-        return np.array(found, dtype=np.complex128).reshape(len(requests), self.scale.size)
+        for number, passed in zip(needed.tolist(), passed_of(requests), strict=True):
+            found[number] = passed.multipliers
+        return found
 
     def _from_changes(self, changes: Changes, multipliers: Complex) -> list[Following["_Begun"]]:
         """Return the searches of boundaries next to changes of a map; see `_multipliers`."""

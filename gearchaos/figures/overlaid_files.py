@@ -82,20 +82,14 @@ def _require_same_machine(name: str, metadata: Mapping[str, Any], result: Result
     messages.
     """
     theirs, ours = _keys_of_machine(metadata), _keys_of_machine(result.metadata)
-    for key in theirs.keys() & ours.keys():
-        fixed = result.fixed.get(axis_name(key.removeprefix("groups.")), ours[key])
-        if theirs[key] != fixed:
+    for key, value in theirs.items():
+        # A value of a swept parameter that was chosen with --at is fixed in the result.
+        given = result.fixed.get(axis_name(key.removeprefix("groups.")), ours.get(key, value))
+        if value != given:
             raise FigureError(
-                f"{name}: was computed with {key} = {theirs[key]}, and the figure is of "
-                f"{key} = {fixed}; give the file that was computed from this result"
+                f"{name}: was computed with {key} = {value}, and the figure is of "
+                f"{key} = {given}; give the file that was computed from this result"
             )
-    for axis, value in result.fixed.items():
-        for key in theirs.keys() - ours.keys():
-            if axis_name(key.removeprefix("groups.")) == axis and theirs[key] != value:
-                raise FigureError(
-                    f"{name}: was computed with {key} = {theirs[key]}, and the figure is of "
-                    f"{key} = {value}; give the file that was computed at this value"
-                )
 
 
 def _keys_of_machine(metadata: Mapping[str, Any]) -> dict[str, Any]:
