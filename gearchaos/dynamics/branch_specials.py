@@ -14,7 +14,7 @@ function comes near to zero, a point of the curve is therefore searched between 
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -113,10 +113,39 @@ def specials_between(
         for flank in range(len(one.impacts))
     ]
     found = yield from together([search for _, _, search in sought])
-    return [
+    specials = [
         (kind, point, flank)
         for (kind, flank, _), points in zip(sought, found, strict=True)
         for point in points
+    ]
+    parted = [point for kind, point, _ in specials if kind == GRAZING]
+    more = yield from _beside_grazings(curve, one, other, parted, located)
+    return specials + [(kind, point, -1) for kind, point in more]
+
+
+def _beside_grazings(
+    curve: Curve, one: CurvePoint, other: CurvePoint, grazings: list[CurvePoint], located: float
+) -> Finding[list[tuple[str, CurvePoint]]]:
+    """Search pairs of special points that the grazings between two points part.
+
+    Next to a grazing the multipliers change with the square root of the parameter: two points of
+    one kind may lie on both sides of it, so that nothing has changed between the outer points.
+    """
+    if not grazings:
+        return []
+    chord = other.place - one.place
+    inner = sorted(grazings, key=lambda point: float((point.place - one.place) @ chord))
+    known = {kind for kind, _ in _changes_of_sign(one, other)}
+    sought = [
+        (kind, _of_multipliers(curve, before, after, (kind, function), located))
+        for before, after in pairwise([one, *inner, other])
+        if np.linalg.norm(after.place - before.place) > ROUNDED
+        for kind, function in _changes_of_sign(before, after)
+        if kind not in known
+    ]
+    found = yield from together([search for _, search in sought])
+    return [
+        (kind, point) for (kind, _), points in zip(sought, found, strict=True) for point in points
     ]
 
 

@@ -34,7 +34,15 @@ from gearchaos.models import Configuration, swept_values
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.progress import count_of, progress, say
-from gearchaos.records.boundary import BOUNDARY_KINDS, RESONANCES, Boundary, BoundaryPoint
+from gearchaos.records.boundary import (
+    BOUNDARY_KINDS,
+    GRAZING_FLIP,
+    GRAZING_FOLD,
+    GRAZING_NEIMARK_SACKER,
+    RESONANCES,
+    Boundary,
+    BoundaryPoint,
+)
 from gearchaos.records.branch import (
     BRANCH_POINT,
     FOLD,
@@ -55,6 +63,16 @@ SIDE_BY_SIDE = 8
 
 COARSE = 24
 """Values of each parameter of the map that is computed from a configuration."""
+
+MEETING = {
+    GRAZING_FOLD: FOLD,
+    GRAZING_FLIP: PERIOD_DOUBLING,
+    GRAZING_NEIMARK_SACKER: NEIMARK_SACKER,
+}
+"""The kind of the boundary that meets a grazing, by the kind of the point at which they meet."""
+
+BESIDE_GRAZING = 1e-4
+"""Distance from a grazing, in shares of the ranges, at which a curve that meets it is begun."""
 
 SIDES = "driving", "back"
 """The flanks of an element in the order of their numbers."""
@@ -398,6 +416,7 @@ class _BoundarySearch:
         self._trace([one for one in new if one.equations.kind != NEIMARK_SACKER])
         # Curves of pairs end at resonances, where several multipliers may meet: they start there.
         self._trace([*self._turning(self.found[before:]), *turning])
+        self._trace(self._meeting_grazings(self.found[before:]))
 
     def _trace(self, begun: list["_Begun"]) -> None:
         """Follow the boundaries through some points of each kind side by side."""
@@ -441,6 +460,26 @@ class _BoundarySearch:
                 if begun.start is not None and not self._passes(turning, begun.start):
                     found.append(begun)
         return found
+
+    def _meeting_grazings(self, boundaries: list[TracedBoundary]) -> list["_Begun"]:
+        """Return points of the curves that meet grazings, on both sides of these."""
+        meetings, searches = list[Equations](), list[Following[OnBoundary | None]]()
+        for boundary in boundaries:
+            for located in boundary.located:
+                if located.kind not in MEETING:
+                    continue
+                meeting = self._equations(boundary.period, MEETING[located.kind])
+                place, tangent = located.point.place, located.point.tangent
+                across = np.zeros_like(tangent)
+                across[-PARAMETERS:] = -tangent[-1], tangent[-2]
+                across /= np.linalg.norm(across)
+                for step in (-BESIDE_GRAZING, BESIDE_GRAZING):
+                    meetings.append(meeting)
+                    searches.append(meeting.beginning(place + step * across, across))
+        starts = run(together(searches), passed_of)
+        begun = [_Begun(*one) for one in zip(meetings, starts, strict=True)]
+        held = run(together([self._held(one) for one in begun]), passed_of)
+        return [one for one, is_held in zip(begun, held, strict=True) if one.within and not is_held]
 
     def _passes(self, equations: Equations, start: OnBoundary) -> bool:
         """Whether a known boundary of the same kind passes by the beginning of another."""

@@ -10,15 +10,18 @@ from gearchaos.dynamics.arclength import Curve
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
 from gearchaos.dynamics.curve_defects import Defect
 from gearchaos.dynamics.side_by_side import run
-from gearchaos.records.branch import FOLD
+from gearchaos.records.branch import FOLD, GRAZING
+
+IMPACTS_DRIVING = 1
 
 CURVE = Curve(None, 0, Plan(12, 0, 1, 1, method="flow_map"), 1, np.ones(1))
 
 
-def cubic_curve(bend):
+def cubic_curve(bend, touches=False):
     """Return the defects of the map x + share - 0.5 - x^3 + bend x, of one state.
 
-    Its orbits lie at the share 0.5 + x^3 - bend x, with the multiplier 1 - 3 x^2 + bend.
+    Its orbits lie at the share 0.5 + x^3 - bend x, with the multiplier 1 - 3 x^2 + bend. If it
+    touches, an impact on the driving flank appears where x passes 0.
     """
 
     def defects(requests):
@@ -32,29 +35,36 @@ def cubic_curve(bend):
             along = np.linalg.solve(bordered, np.array([0.0, 1.0]))
             size = float(np.abs(distance[0]))
             section = np.array([[x]])
-            found.append(Defect(distance, size, slopes, step, along, section, np.zeros((0, 4))))
+            contact = np.zeros((1 if touches else 0, 4))
+            contact[:, IMPACTS_DRIVING] = x > 0.0
+            found.append(Defect(distance, size, slopes, step, along, section, contact))
         return found
 
     return defects
 
 
+def points_at(bend, states):
+    """Search the points of the cubic curve at states."""
+    points = []
+    for x in states:
+        place = np.array([x, 0.5 + x**3 - bend * x])
+        direction = np.array([1.0, 3.0 * x**2 - bend])
+        points.append((yield from CURVE.correcting(place, direction)))
+    return points
+
+
 def special_points(bend, states):
     """Return the special points that are found on the cubic curve from its points at states."""
-    defects = cubic_curve(bend)
 
     def search():
-        points = []
-        for x in states:
-            place = np.array([x, 0.5 + x**3 - bend * x])
-            direction = np.array([1.0, 3.0 * x**2 - bend])
-            points.append((yield from CURVE.correcting(place, direction)))
+        points = yield from points_at(bend, states)
         points = yield from with_pairs_parted(CURVE, points)
         found = []
         for one, other in pairwise(points):
             found += yield from specials_between(CURVE, one, other, LOCATED)
         return found
 
-    return run(search(), defects)
+    return run(search(), cubic_curve(bend))
 
 
 COARSE = (-0.8, -0.5, -0.21, 0.2, 0.5, 0.8)
@@ -73,3 +83,16 @@ def test_two_folds_between_the_same_points_are_both_found(bend):
 
 def test_a_curve_that_nearly_folds_has_no_special_point():
     assert special_points(-1e-3, COARSE) == []
+
+
+def test_two_folds_on_both_sides_of_a_grazing_are_found():
+    def search():
+        one, other = yield from points_at(0.01, (-0.21, 0.2))
+        return (yield from specials_between(CURVE, one, other, LOCATED))
+
+    found = run(search(), cubic_curve(0.01, touches=True))
+    found.sort(key=lambda special: special[1].place[0])
+    assert [kind for kind, _, _ in found] == [FOLD, GRAZING, FOLD]
+    x = np.sqrt(0.01 / 3.0)
+    states = [point.place[0] for _, point, _ in found]
+    np.testing.assert_allclose(states, [-x, 0.0, x], rtol=0, atol=1e-6)

@@ -9,7 +9,13 @@ import pytest
 import gearchaos
 from gearchaos.dynamics import boundary_following, boundary_tests
 from gearchaos.engine.bounding import coarse_map, find_boundaries
-from gearchaos.records.boundary import CORNER, GRAZING_FLIP, GRAZING_FOLD, STRONG_RESONANCE_11
+from gearchaos.records.boundary import (
+    CORNER,
+    GRAZING_FLIP,
+    GRAZING_FOLD,
+    GRAZING_NEIMARK_SACKER,
+    STRONG_RESONANCE_11,
+)
 from gearchaos.records.branch import EDGE, FOLD, GRAZING, LOST, NEIMARK_SACKER, PERIOD_DOUBLING
 
 MAP = Path(__file__).parents[2] / "sweeps" / "speed_and_error.toml"
@@ -52,7 +58,7 @@ def resonances(kind):
 
 
 def test_every_curve_ends_for_a_reason():
-    assert len(boundaries()) == 15
+    assert len(boundaries()) == 17
     assert not any(LOST in one.ends for one in boundaries())
 
 
@@ -96,12 +102,33 @@ def test_a_resonance_next_to_a_third_multiplier_is_located():
 
 
 def test_a_curve_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
-    (curve,) = [one for one in curves(PERIOD_DOUBLING) if CORNER in one.ends]
+    (curve,) = [one for one in curves(PERIOD_DOUBLING) if {*one.ends} == {CORNER, EDGE}]
     end = curve.values[0 if curve.ends[0] == CORNER else -1]
     meetings = [places(one, GRAZING_FLIP) for one in curves(GRAZING)]
     away = np.abs(np.concatenate(meetings) - end).max(axis=1)
     # Beside the square root of a grazing the last 40 points cover less than 0.001.
     assert away.min() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("kind", "meeting", "place"),
+    [
+        # Of an independent integration: on one side of the grazing only.
+        (NEIMARK_SACKER, GRAZING_NEIMARK_SACKER, (0.723330489, 13.695652174)),
+        (PERIOD_DOUBLING, GRAZING_FLIP, (0.70654297, 13.43810898)),
+    ],
+)
+def test_a_curve_between_two_points_of_a_grazing_is_found(kind, meeting, place):
+    (curve,) = [one for one in curves(kind) if one.ends == (CORNER, CORNER)]
+    meetings = np.concatenate([places(one, meeting) for one in curves(GRAZING)])
+    for end in curve.values[[0, -1]]:
+        assert np.abs(meetings - end).max(axis=1).min() < 1e-4
+    # Its points lie as close as lines between them need.
+    line = curve.values
+    step, away = np.diff(line, axis=0), np.array(place) - line[:-1]
+    share = np.clip(np.sum(away * step, axis=1) / np.sum(step**2, axis=1), 0.0, 1.0)
+    beside = np.abs(away - share[:, np.newaxis] * step)
+    assert (beside / (1.5, 15.0)).max(axis=1).min() < 1e-3
 
 
 def test_a_fold_goes_on_behind_a_grazing_where_it_is_started_on_both_sides():

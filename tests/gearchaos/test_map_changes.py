@@ -1,16 +1,21 @@
 """Changes of a map between neighbouring cells, from which boundaries are started."""
 
 import numpy as np
+import pytest
 
 import gearchaos
-from gearchaos.engine.map_changes import DOUBLES, changes_of
+from gearchaos.engine.map_changes import DOUBLES, JUMP, changes_of
 from gearchaos.outputs.variable import Variable
 
 
-def of_map(period, impacts=None):
-    """Return the changes of a map, whose periods have the shape (second, first)."""
+def of_map(period, impacts=None, jump=0.0):
+    """Return the changes of a map, whose periods have the shape (second, first).
+
+    ``jump``: by how much the first state jumps between the fourth and the fifth column.
+    """
     period = np.asarray(period)
     second, first = np.meshgrid(np.arange(5.0), np.arange(6.0), indexing="ij")
+    first = first + jump * (first > 3.5)
     data = {
         "b": np.arange(5.0),
         "a": np.arange(6.0),
@@ -66,6 +71,18 @@ def test_other_impacts_change_the_motion_of_equal_periods():
     sides = {((3, row), (4, row)) for row in range(5)}
     assert cells(found) == sides | {pair[::-1] for pair in sides}
     assert (found.flank == 0).all()
+
+
+@pytest.mark.parametrize(("jump", "jumps"), [(0.8, False), (1.5, True)])
+def test_a_small_jump_counts_where_impacts_change(jump, jumps):
+    period, impacts = np.ones((5, 6), dtype=int), np.zeros((5, 6))
+    impacts[:, 4:] = 1.0
+    assert not (of_map(period, jump=jump).flank == JUMP).any()
+    found = of_map(period, impacts, jump)
+    sides = {((3, row), (4, row)) for row in range(5)}
+    both = sides | {pair[::-1] for pair in sides}
+    assert cells(found.of(found.flank == JUMP)) == (both if jumps else set())
+    assert cells(found.of(found.flank == 0)) == both
 
 
 def test_a_curve_explains_the_changes_within_one_cell():

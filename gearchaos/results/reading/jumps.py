@@ -24,6 +24,9 @@ then up to 2.5 times as long as the next one, and any number of times as long as
 """
 
 SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the sweep.
+FAINT, FAINTEST = 2.0, 1e-3
+"""The same factor for a jump that may be one, on both sides, and its smallest size."""
+
 BESIDE = 8  # Number of lanes on either side of a crisis that are compared.
 FEWEST = 3  # Fewest lanes on either side of a crisis; two of them must be chaotic.
 SMALLEST_GROWTH = 0.15  # Smallest growth of the extent, relative to the largest one before.
@@ -141,7 +144,11 @@ def size_of(sections: Floats) -> Floats:
 
 
 def jump_sizes(
-    period: Counts, section: Floats, cells: Floats | float = 1.0, alone: float = np.nan
+    period: Counts,
+    section: Floats,
+    cells: Floats | float = 1.0,
+    alone: float = np.nan,
+    faint: bool = False,
 ) -> Floats:
     """Return the distance of neighbouring lanes at a jump, 0 elsewhere, shape (lanes - 1,).
 
@@ -159,6 +166,8 @@ def jump_sizes(
         Distance that is assumed between lanes of different periods. With 0, two lanes without
         comparable lanes beside them may count as a jump. At the ends of the sweep only the inner
         side is compared.
+    faint : bool
+        Whether smaller and less steep changes count as well. Some of them are no jumps.
 
     Returns
     -------
@@ -172,6 +181,8 @@ def jump_sizes(
     rate = np.where(np.isnan(apart), alone, apart) / cells
     rate = np.pad(rate, 1, constant_values=np.nan)
     one, both = (of(rate[:-2], rate[2:]) * cells for of in (np.fmin, np.fmax))
+    if faint:
+        return np.where((apart > FAINTEST) & (apart > FAINT * both), apart, 0.0)
     steep = (apart > STEEPEST * one) & (apart > STEEPER * both)
     return np.where((apart > SMALLEST) & steep, apart, 0.0)
 
