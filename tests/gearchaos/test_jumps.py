@@ -89,6 +89,15 @@ def test_the_hop_of_figure_7_is_a_jump_within_period_1(hop, tmp_path):
     assert facts["jumps"] == [{"below": jump.below, "above": jump.above, "label": "period 1"}]
 
 
+@pytest.mark.parametrize(("returns", "found"), [(2e-5, 1), (1e-2, 0)])
+def test_a_jump_is_larger_than_what_a_lane_that_converges_may_be_off(hop, returns, found):
+    away = np.where(hop["pitch_error"] > 1.045, returns, 0.0)
+    data = {name: hop[name] for name in hop.variables} | {"return_distance": away}
+    variables = [*hop.variables.values()]
+    other = gearchaos.Result(hop.axes, variables, data, hop.parameters, hop.metadata)
+    assert len(jumps(other)) == found
+
+
 def test_neighbours_an_excitation_period_apart_have_not_jumped():
     gear = "pitch_error={kind='teeth', driving={file='inspection.csv', column='driving'}}"
     starts = "start={kind='random', spread=1.0}"

@@ -27,6 +27,12 @@ SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the s
 FAINT, FAINTEST = 2.0, 1e-3
 """The same factor for a jump that may be one, on both sides, and its smallest size."""
 
+UNSETTLED = 1e3
+"""Smallest jump next to a lane that still converges, in return distances of this lane.
+
+The distance from the orbit is the return distance over 1 - |multiplier| of the slowest mode.
+"""
+
 BESIDE = 8  # Number of lanes on either side of a crisis that are compared.
 FEWEST = 3  # Fewest lanes on either side of a crisis; two of them must be chaotic.
 SMALLEST_GROWTH = 0.15  # Smallest growth of the extent, relative to the largest one before.
@@ -113,11 +119,13 @@ def jumps(result: Result) -> list[Jump]:
     []
     """
     lanes = labelled_lanes(result)
-    # A lane that has not converged to its orbit may be at any distance.
-    arrived = ~(result["return_distance"] > TOLERANCE)
     sections = sections_of(result)
-    period = np.where(arrived, lanes.period, 0)
-    found = np.flatnonzero(jump_sizes(period, sections / size_of(sections)))
+    sizes = jump_sizes(lanes.period, sections / size_of(sections))
+    # A lane that still converges to its orbit may be at any distance from it.
+    returns = np.nan_to_num(result["return_distance"])
+    away = np.maximum(returns[:-1], returns[1:])
+    arrived = (away <= TOLERANCE) | (sizes > UNSETTLED * away)
+    found = np.flatnonzero((sizes > 0.0) & arrived)
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
         for at in found
