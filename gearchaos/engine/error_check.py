@@ -10,6 +10,7 @@ from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.outputs.names import SECTION
 from gearchaos.progress import count_of
 from gearchaos.records.control import CAPTURE_MEANINGS, CAPTURED, NO_GAIN, NO_ORBIT, OFF
+from gearchaos.records.label import GROWS, UNRESOLVED
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 CHANGE_MEANINGS = (
@@ -65,7 +66,7 @@ class Tally:
         self._repeats = repeats
         self.diverged = self._too_fast = self._mixed = 0
         self._controlled = self._captured = self._without_orbit = self._without_gain = 0
-        self._unsplit_lanes = self._unsplit_steps = 0
+        self._unsplit_lanes = self._unsplit_steps = self._growing = 0
         self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD, _OF_KEPT)}
 
     def add(self, arrays: Mapping[str, Array]) -> None:
@@ -75,6 +76,7 @@ class Tally:
         self._unsplit_lanes += int(np.count_nonzero(arrays.get("unsplit_steps", 0)))
         self._unsplit_steps += int(np.sum(arrays.get("unsplit_steps", 0)))
         self._mixed += int(np.count_nonzero(arrays.get("record", UNIFORM) == MIXED))
+        self._growing += int(np.count_nonzero(arrays.get("motion", UNRESOLVED) == GROWS))
         if "capture" in arrays:
             counts = np.bincount(arrays["capture"], minlength=len(CAPTURE_MEANINGS))
             self._controlled += int(counts.sum() - counts[OFF])
@@ -103,6 +105,12 @@ class Tally:
                 f"{self._unsplit_steps} steps of {self._unsplit_lanes} lanes crossed contact "
                 "boundaries too often to be split at each (unsplit_steps in the file); raise "
                 "integration.steps_per_period",
+            ),
+            (
+                self._growing,
+                f"the motion of {count_of(self._growing, 'lane')} grows without bound (grows in "
+                "the file); shorter steps do not change this: add damping, or check the varying "
+                "stiffness for a parametric resonance",
             ),
             (
                 self._mixed,

@@ -183,7 +183,11 @@ def test_slow_growth_of_a_linear_scene_is_growth():
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((4, 10)), once))
     size = np.max(np.abs(multipliers), axis=1)
     assert np.abs(size - 1.0).max() < 3e-3
-    assert (computed(sweep, 4)["motion"] == GROWS).tolist() == (size > 1.0).tolist()
+    arrays = computed(sweep, 4)
+    assert (arrays["motion"] == GROWS).tolist() == (size > 1.0).tolist()
+    tally = Tally()
+    tally.add(arrays)
+    assert "the motion of 2 lanes grows without bound" in "".join(tally.remarks)
     assert (size > 1.0).tolist() == [False, False, True, True]
 
 
