@@ -1,6 +1,7 @@
 """Find the attractors of a sweep from many starts, and the share of the starts that leads to each.
 
-An attractor keeps its number along the sweep. The table goes to stdout, everything else to stderr.
+An attractor keeps its number along the sweep. If --at chooses one value of the swept parameter, the
+numbers are those of this value alone. The table goes to stdout, everything else to stderr.
 
 With --output, the command also draws a figure: the basins of one value over the two states of a
 grid of starts, or the shares of several values.
@@ -79,7 +80,7 @@ def _basins(options: BasinsOptions) -> None:
     whole = open_result(options.result)
     if options.output:
         check_figures([options.output], [options.result], options.overwrite)
-    part = whole.sel("within", **placed_coordinates(options.at, whole.axes, whole.axis))
+    part = whole.sel("within", **placed_coordinates(options.at, whole.axes, START))
     kept = {START} | ({part.axis} - {*REPEATS})
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})
     with compiling():

@@ -184,8 +184,9 @@ def test_one_value_is_reported_with_entropy_and_the_means_of_its_basins(folder):
     told = " ".join(out.split())
     assert "1: contact_state_tangential held, crossings_per_period 0" in told
     assert "2: contact_state_tangential single_sided_impact" in told
-    at = run(folder, "several.h5", "--at", "pitch_error=1.1").out.splitlines()
-    assert at[1] == "slice pitch_error = 1.2; others with --at pitch_error=VALUE"
+    for place in ("pitch_error=1.1", "1.1"):
+        at = run(folder, "several.h5", "--at", place).out.splitlines()
+        assert at[1] == "slice pitch_error = 1.2; others with --at pitch_error=VALUE"
 
 
 def test_json_reports_all_of_it(folder, grid):
