@@ -90,8 +90,23 @@ def _export(options: ExportOptions) -> None:
                 needed("pyarrow")
                 frame.to_parquet(partial, engine="pyarrow")
             rows, columns = frame.shape
-            say(f"{count_of(rows, 'row')} of {columns} columns and {_index(frame)}")
+            say(
+                f"{count_of(rows, 'row')} of {columns} columns and {_index(frame)}",
+                *_left(result, frame),
+            )
     print(options.output, flush=True)
+
+
+def _left(result: "Result", frame: Any) -> list[str]:
+    """Return a line about the amplitudes that a table of lanes does not have, if there are any."""
+    from gearchaos.outputs.names import ORDER
+
+    amplitudes = [name for name, one in result.variables.items() if ORDER in one.dims[1:]]
+    if not amplitudes or ORDER in frame.index.names:
+        return []
+    return [
+        f"without the amplitudes over {ORDER}, which have a table of their own: --along {ORDER}"
+    ]
 
 
 def _index(frame: Any) -> str:

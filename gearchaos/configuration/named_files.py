@@ -128,7 +128,8 @@ class CsvText:
             text = cell.replace(",", ".") if self._decimal_comma else cell
             if not (NUMBER.fullmatch(text) and isfinite(float(text))):
                 rule = f"line {line}, column {name}: must be a finite number"
-                raise ValueError(rule, f"give one for every {whose}, decimals with a point")
+                mark = "a point or a comma" if self._decimal_comma else "a point"
+                raise ValueError(rule, f"give one for every {whose}, decimals with {mark}")
             yield float(text)
 
 

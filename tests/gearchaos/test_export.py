@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import gearchaos
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.export import main
 from gearchaos.figures import amplitude_spectrum, time_history
 from gearchaos.figures.response import spectrum_of
+from gearchaos.outputs.variable import Variable
 from gearchaos.results.reading.result import open_result
 
 from .commands import LINEAR, run_module, small_config
@@ -55,6 +57,24 @@ def test_a_table_has_a_row_per_lane_and_words_for_flags():
         RESULT.to_dataframe("time")
     one = RESULT.sel(load=0.1, start=0).to_dataframe()
     assert one.index.name == "pitch_error"
+
+
+def test_a_table_of_lanes_names_the_option_for_amplitudes(tmp_path, capsys):
+    pytest.importorskip("pandas")
+    lanes = RESULT["lyapunov_exponent"].shape
+    added = {"order": np.array([0.5, 1.0]), "amplitude_delta_5": np.ones((*lanes, 2))}
+    variables = [
+        *RESULT.variables.values(),
+        Variable("order", ("order",), "float64", "1", "frequency over mesh frequency"),
+        Variable("amplitude_delta_5", (*RESULT.axes, "order"), "float64", "1", "amplitude"),
+    ]
+    data = {name: RESULT[name] for name in RESULT.variables} | added
+    other = gearchaos.Result(RESULT.axes, variables, data, RESULT.parameters, RESULT.metadata)
+    other.save(tmp_path / "orders.h5")
+    for path, names in (("orders.h5", True), ("r.h5", False)):
+        RESULT.save(tmp_path / "r.h5", overwrite=True)
+        assert main([str(tmp_path / path), str(tmp_path / f"{path}.csv")]) == 0
+        assert ("--along order" in capsys.readouterr().err) == names
 
 
 def test_a_flag_without_a_meaning_is_missing_in_the_table():

@@ -223,7 +223,8 @@ FAULTY_FILES = {
     ),
     "short row": (
         "x;Fp\n1;0.0\n\n2\n3;1.0\n",
-        "line 4, column Fp: must be a finite number; give",
+        "line 4, column Fp: must be a finite number; give one for every tooth, decimals with a "
+        "point or a comma",
     ),
     "missing tooth": (ROWS.replace("4.0\n", ""), "gear.csv, column Fp: holds 4 values for 5 teeth"),
     "binary": (
