@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.arclength import Curve, CurvePoint, cubic
+from gearchaos.dynamics.arclength import Curve, CurvePoint, cubic, is_exact
 from gearchaos.dynamics.curve_defects import Finding
 from gearchaos.dynamics.near_grazings import TestFunction, near_grazings
 from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
@@ -50,6 +50,12 @@ ROUNDING_OF_TESTS = 1e-7
 
 Where a linear motion loses stability, orbits of a whole range of amplitudes exist at one value of
 the parameter: along them a multiplier stays 1, and the parameter does not change.
+"""
+
+STRETCH, JUMPING = 1e-7, 1e-5
+"""Lengths of a stretch without further points, in which a special point counts as located.
+
+The second one is for RK4: its curve jumps where it begins to see a contact.
 """
 
 MOST_TRIALS = 80
@@ -244,7 +250,8 @@ def _located(
         share = 0.5 if bisects or number % 3 == 2 else low / (low - high)
         middle = yield from _between(curve, one, other, min(max(share, 1e-3), 1.0 - 1e-3))
         if middle is None:
-            return _Place(nearest, other) if length < 1e-7 else None
+            enough = STRETCH if is_exact(curve.plan) else JUMPING
+            return _Place(nearest, other) if length < enough else None
         nearest, value = middle, function(middle)
         if value == 0.0:
             break

@@ -17,11 +17,12 @@ IMPACTS_DRIVING = 1
 CURVE = Curve(None, 0, Plan(12, 0, 1, 1, method="flow_map"), 1, np.ones(1))
 
 
-def cubic_curve(bend, touches=False):
+def cubic_curve(bend, touches=False, gap=0.0):
     """Return the defects of the map x + share - 0.5 - x^3 + bend x, of one state.
 
     Its orbits lie at the share 0.5 + x^3 - bend x, with the multiplier 1 - 3 x^2 + bend. If it
-    touches, an impact on the driving flank appears where x passes 0.
+    touches, an impact on the driving flank appears where x passes 0. No orbit is closer to 0
+    than half the gap.
     """
 
     def defects(requests):
@@ -33,7 +34,7 @@ def cubic_curve(bend, touches=False):
             bordered = np.vstack([slopes, request.normal])
             step = np.linalg.solve(bordered, np.append(distance, 0.0))
             along = np.linalg.solve(bordered, np.array([0.0, 1.0]))
-            size = float(np.abs(distance[0]))
+            size = float(np.abs(distance[0])) if abs(x) > gap / 2.0 else np.nan
             section = np.array([[x]])
             contact = np.zeros((1 if touches else 0, 4))
             contact[:, IMPACTS_DRIVING] = x > 0.0
@@ -96,3 +97,18 @@ def test_two_folds_on_both_sides_of_a_grazing_are_found():
     x = np.sqrt(0.01 / 3.0)
     states = [point.place[0] for _, point, _ in found]
     np.testing.assert_allclose(states, [-x, 0.0, x], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("method", "found"), [("rk4", True), ("flow_map", False)])
+def test_a_grazing_at_which_the_curve_of_rk4_jumps_is_located(method, found):
+    plan = CURVE.plan._replace(method=method)
+    curve = CURVE._replace(plan=plan)
+
+    def search():
+        one, other = yield from points_at(-0.1, (-0.21, 0.13))
+        return (yield from specials_between(curve, one, other, LOCATED))
+
+    specials = run(search(), cubic_curve(-0.1, touches=True, gap=4e-7))
+    assert [kind for kind, _, _ in specials] == ([GRAZING] if found else [])
+    if found:
+        assert abs(specials[0][1].place[0]) < 1e-5
