@@ -20,7 +20,6 @@ from machine import print_machine
 
 from gearchaos import load_config
 from gearchaos.engine.run_plan import plan_run
-from gearchaos.models.registry import system_of
 
 SWEEP = Path(__file__).parents[1] / "sweeps" / "pan2021.toml"
 
@@ -43,9 +42,8 @@ def main() -> None:
 def _sweep(method: str, lanes: int) -> Callable[[int], float]:
     """Return work that integrates the sweep with a number of threads and returns its seconds."""
     changes = [f"sweep.count={lanes}", f'integration.method="{method}"']
-    config = load_config(SWEEP, changes)
-    run = plan_run(config)
-    system = system_of(config, run.lanes.values_of(np.arange(lanes)))
+    run = plan_run(load_config(SWEEP, changes))
+    system = run.lanes.system_of(np.arange(lanes))
     start = np.zeros((lanes, len(system.states)))
 
     def work(threads: int) -> float:

@@ -101,8 +101,7 @@ def _left(result: "Result", frame: Any) -> list[str]:
     """Return a line about the amplitudes that a table of lanes does not have, if there are any."""
     from gearchaos.outputs.names import ORDER
 
-    amplitudes = [name for name, one in result.variables.items() if ORDER in one.dims[1:]]
-    if not amplitudes or ORDER in frame.index.names:
+    if ORDER not in result.variables or ORDER in frame.index.names:
         return []
     return [
         f"without the amplitudes over {ORDER}, which have a table of their own: --along {ORDER}"

@@ -105,54 +105,50 @@ def _test_functions(point: CurvePoint) -> dict[str, float]:
 def specials_between(
     curve: Curve, one: CurvePoint, other: CurvePoint, located: float
 ) -> Finding[list[tuple[str, CurvePoint, int]]]:
-    """Search kind, point and flank of the special points between two points of a curve.
+    """Search kind, point and flank of the special points between two points, along the curve.
 
     A flank is that of a grazing, and otherwise -1. ``located``: length of the stretch of the curve
     in which a special point lies.
     """
-    sought = [
-        (kind, -1, _of_multipliers(curve, one, other, (kind, function), located))
-        for kind, function in _changes_of_sign(one, other)
-    ]
-    sought += [
-        (GRAZING, flank, _grazings(curve, one, other, flank, located))
-        for flank in range(len(one.impacts))
-    ]
-    found = yield from together([search for _, _, search in sought])
+    flanks = range(len(one.impacts))
+    grazing = yield from together(
+        [_grazings(curve, one, other, flank, located) for flank in flanks]
+    )
     specials = [
-        (kind, point, flank)
-        for (kind, flank, _), points in zip(sought, found, strict=True)
+        (GRAZING, point, flank)
+        for flank, points in zip(flanks, grazing, strict=True)
         for point in points
     ]
-    parted = [point for kind, point, _ in specials if kind == GRAZING]
-    more = yield from _beside_grazings(curve, one, other, parted, located)
-    return specials + [(kind, point, -1) for kind, point in more]
-
-
-def _beside_grazings(
-    curve: Curve, one: CurvePoint, other: CurvePoint, grazings: list[CurvePoint], located: float
-) -> Finding[list[tuple[str, CurvePoint]]]:
-    """Search pairs of special points that the grazings between two points part.
-
-    Next to a grazing the multipliers change with the square root of the parameter: two points of
-    one kind may lie on both sides of it, so that nothing has changed between the outer points.
-    """
-    if not grazings:
-        return []
-    chord = other.place - one.place
-    inner = sorted(grazings, key=lambda point: float((point.place - one.place) @ chord))
-    known = {kind for kind, _ in _changes_of_sign(one, other)}
+    specials.sort(key=lambda special: _along(one, special[1], other))
+    # Next to a grazing the multipliers change with the square root of the parameter: two points of
+    # one kind may lie on both sides of it.
     sought = [
         (kind, _of_multipliers(curve, before, after, (kind, function), located))
-        for before, after in pairwise([one, *inner, other])
-        if np.linalg.norm(after.place - before.place) > ROUNDED
+        for before, after in pairwise(_parted(one, [point for _, point, _ in specials], other))
         for kind, function in _changes_of_sign(before, after)
-        if kind not in known
     ]
     found = yield from together([search for _, search in sought])
-    return [
-        (kind, point) for (kind, _), points in zip(sought, found, strict=True) for point in points
+    specials += [
+        (kind, point, -1)
+        for (kind, _), points in zip(sought, found, strict=True)
+        for point in points
     ]
+    return sorted(specials, key=lambda special: _along(one, special[1], other))
+
+
+def _along(one: CurvePoint, point: CurvePoint, other: CurvePoint) -> float:
+    """Return how far a point lies from one towards another point."""
+    return float((point.place - one.place) @ (other.place - one.place))
+
+
+def _parted(one: CurvePoint, between: Sequence[CurvePoint], other: CurvePoint) -> list[CurvePoint]:
+    """Return two points with those between them, without any that coincide up to rounding."""
+    parted = [one]
+    for point in between:
+        away = [np.linalg.norm(point.place - end.place) for end in (parted[-1], other)]
+        if min(away) > ROUNDED:
+            parted.append(point)
+    return [*parted, other]
 
 
 def _of_multipliers(

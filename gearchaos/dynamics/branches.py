@@ -262,9 +262,8 @@ def _with_specials(
             ]
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
-    for (one, other), between in zip(pairwise(points), located_between, strict=True):
-        chord = other.place - one.place
-        for special in sorted(between, key=lambda it: float((it[1].place - one.place) @ chord)):
+    for other, between in zip(points[1:], located_between, strict=True):
+        for special in between:
             found.append((len(joined), special))
             joined.append(special[1])
         joined.append(other)

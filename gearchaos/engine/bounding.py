@@ -203,6 +203,14 @@ class _Begun(NamedTuple):
         return repeats_sooner(self.start.section, self.equations.scale)
 
 
+def _beginning(
+    equations: Equations, guess: Floats, direction: Floats, special: CurvePoint | None = None
+) -> Following[_Begun]:
+    """Search the beginning of a boundary next to a guess, or to a special point of a branch."""
+    start = yield from equations.beginning(guess, direction)
+    return _Begun(equations, start, guess, special)
+
+
 class _BoundarySearch:
     """The boundaries that are known so far; ``result`` gives the scales of the states."""
 
@@ -382,8 +390,7 @@ class _BoundarySearch:
         """Search the point of a boundary next to a change of a map."""
         equations = self._equations(change.period, kind, change.flank)
         guess = np.append(change.state / self.scale, change.shares)
-        start = yield from equations.beginning(guess, self._along(change.number))
-        return _Begun(equations, start, guess, None)
+        return _beginning(equations, guess, self._along(change.number))
 
     def _from_special(
         self, branch: TracedBranch, special: Special, line: Line
@@ -392,8 +399,7 @@ class _BoundarySearch:
         equations = self._equations(branch.period, special.kind, special.flank)
         shares = self.over.shares(line, special.point.share)
         guess = np.concatenate([special.point.place[:-1], shares])
-        start = yield from equations.beginning(guess, self._along(line.number))
-        return _Begun(equations, start, guess, special.point)
+        return _beginning(equations, guess, self._along(line.number), special.point)
 
     def _along(self, number: int) -> Floats:
         """Return the direction in which a parameter alone grows, (states + 2,)."""
@@ -404,19 +410,17 @@ class _BoundarySearch:
     def _follow(self, searches: list[Following["_Begun"]]) -> None:
         """Follow the boundaries through points that lie on none that is known."""
         begun = run(together(searches), passed_of)
-        held = run(together([self._held(one) for one in begun]), passed_of)
-        new: list[_Begun] = []
-        for one, is_held in zip(begun, held, strict=True):
+        new = self._unknown(begun)
+        for one in begun:
             if one.start is None and one.special is not None:
                 self.found.append(unstarted(one.equations, one.guess, one.special))
-            if not is_held and one.within and not one.repeats_sooner:
-                new.append(one)
         before = len(self.found)
         turning = [one for one in new if one.equations.kind == NEIMARK_SACKER]
         self._trace([one for one in new if one.equations.kind != NEIMARK_SACKER])
         # Curves of pairs end at resonances, where several multipliers may meet: they start there.
         self._trace([*self._turning(self.found[before:]), *turning])
-        self._trace(self._meeting_grazings(self.found[before:]))
+        meeting = run(together(self._meeting_grazings(self.found[before:])), passed_of)
+        self._trace(self._unknown(meeting))
 
     def _trace(self, begun: list["_Begun"]) -> None:
         """Follow the boundaries through some points of each kind side by side."""
@@ -435,6 +439,15 @@ class _BoundarySearch:
             middle = boundary.points[int(np.argmin(np.abs(positions - positions[-1] / 2.0)))]
             if not run(self._held(_Begun(boundary.equations, middle)), passed_of):
                 self.found.append(boundary)
+
+    def _unknown(self, begun: Sequence["_Begun"]) -> list["_Begun"]:
+        """Return the points within both ranges that begin boundaries which are not known."""
+        held = run(together([self._held(one) for one in begun]), passed_of)
+        return [
+            one
+            for one, is_held in zip(begun, held, strict=True)
+            if not is_held and one.within and not one.repeats_sooner
+        ]
 
     def _held(self, begun: "_Begun") -> Following[bool]:
         """Search whether a point lies on a boundary that is known."""
@@ -461,9 +474,9 @@ class _BoundarySearch:
                     found.append(begun)
         return found
 
-    def _meeting_grazings(self, boundaries: list[TracedBoundary]) -> list["_Begun"]:
-        """Return points of the curves that meet grazings, on both sides of these."""
-        meetings, searches = list[Equations](), list[Following[OnBoundary | None]]()
+    def _meeting_grazings(self, boundaries: list[TracedBoundary]) -> list[Following["_Begun"]]:
+        """Return the searches of the curves that meet grazings, on both sides of these."""
+        searches = []
         for boundary in boundaries:
             for located in boundary.located:
                 if located.kind not in MEETING:
@@ -473,13 +486,11 @@ class _BoundarySearch:
                 across = np.zeros_like(tangent)
                 across[-PARAMETERS:] = -tangent[-1], tangent[-2]
                 across /= np.linalg.norm(across)
-                for step in (-BESIDE_GRAZING, BESIDE_GRAZING):
-                    meetings.append(meeting)
-                    searches.append(meeting.beginning(place + step * across, across))
-        starts = run(together(searches), passed_of)
-        begun = [_Begun(*one) for one in zip(meetings, starts, strict=True)]
-        held = run(together([self._held(one) for one in begun]), passed_of)
-        return [one for one, is_held in zip(begun, held, strict=True) if one.within and not is_held]
+                searches += [
+                    _beginning(meeting, place + step * across, across)
+                    for step in (-BESIDE_GRAZING, BESIDE_GRAZING)
+                ]
+        return searches
 
     def _passes(self, equations: Equations, start: OnBoundary) -> bool:
         """Whether a known boundary of the same kind passes by the beginning of another."""

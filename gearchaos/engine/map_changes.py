@@ -167,8 +167,7 @@ def changes_of(
             found.append(_rows(flank, number, more & ~differs, periodic))
             touches |= more
         # A small jump where impacts change would pass for a grazing.
-        jump = _jumps(number, period, sections) | touches & _jumps(number, period, sections, True)
-        found.append(_rows(JUMP, number, jump, periodic))
+        found.append(_rows(JUMP, number, _jumps(number, period, sections, touches), periodic))
     rows, growth = np.concatenate(found), np.zeros(period.size)
     if "lyapunov_exponent" in result.variables:
         growth = result.lanes("lyapunov_exponent")
@@ -212,17 +211,18 @@ def _sections(result: Result) -> Floats:
     return np.asarray(sections / size_of(sections))
 
 
-def _jumps(axis: int, period: Integers, sections: Floats, faint: bool = False) -> Mask:
+def _jumps(axis: int, period: Integers, sections: Floats, faint: Mask) -> Mask:
     """Return between which cells that are neighbours along an axis motions of one period jump.
 
     ``period`` has the shape of the map, ``sections`` that shape and then points and states.
-    ``faint``: see `jump_sizes`.
+    ``faint``: between which cells a small jump counts, see `jump_sizes`.
     """
     along, points = np.moveaxis(period, axis, 0), np.moveaxis(sections, axis, 0)
-    found = np.zeros((along.shape[0] - 1, *along.shape[1:]), dtype=bool)
+    small = np.moveaxis(faint, axis, 0)
+    found = np.zeros(small.shape, dtype=bool)
     for line in np.ndindex(along.shape[1:]):
         at = (slice(None), *line)
-        found[at] = jump_sizes(along[at], points[at], alone=0.0, faint=faint) > 0.0
+        found[at] = jump_sizes(along[at], points[at], alone=0.0, faint=small[at]) > 0.0
     return np.moveaxis(found, 0, axis)
 
 

@@ -59,7 +59,7 @@ def test_a_table_has_a_row_per_lane_and_words_for_flags():
     assert one.index.name == "pitch_error"
 
 
-def test_a_table_of_lanes_names_the_option_for_amplitudes(tmp_path, capsys):
+def test_a_table_of_lanes_names_the_option_for_amplitudes(path, tmp_path, capsys):
     pytest.importorskip("pandas")
     lanes = RESULT["lyapunov_exponent"].shape
     added = {"order": np.array([0.5, 1.0]), "amplitude_delta_5": np.ones((*lanes, 2))}
@@ -71,9 +71,8 @@ def test_a_table_of_lanes_names_the_option_for_amplitudes(tmp_path, capsys):
     data = {name: RESULT[name] for name in RESULT.variables} | added
     other = gearchaos.Result(RESULT.axes, variables, data, RESULT.parameters, RESULT.metadata)
     other.save(tmp_path / "orders.h5")
-    for path, names in (("orders.h5", True), ("r.h5", False)):
-        RESULT.save(tmp_path / "r.h5", overwrite=True)
-        assert main([str(tmp_path / path), str(tmp_path / f"{path}.csv")]) == 0
+    for file, names in ((tmp_path / "orders.h5", True), (path, False)):
+        assert main([str(file), str(file.with_suffix(".csv"))]) == 0
         assert ("--along order" in capsys.readouterr().err) == names
 
 

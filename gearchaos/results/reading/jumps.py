@@ -156,7 +156,7 @@ def jump_sizes(
     section: Floats,
     cells: Floats | float = 1.0,
     alone: float = np.nan,
-    faint: bool = False,
+    faint: Mask | bool = False,
 ) -> Floats:
     """Return the distance of neighbouring lanes at a jump, 0 elsewhere, shape (lanes - 1,).
 
@@ -174,8 +174,8 @@ def jump_sizes(
         Distance that is assumed between lanes of different periods. With 0, two lanes without
         comparable lanes beside them may count as a jump. At the ends of the sweep only the inner
         side is compared.
-    faint : bool
-        Whether smaller and less steep changes count as well. Some of them are no jumps.
+    faint : bool, or array of bool, shape (lanes - 1,)
+        Where smaller and less steep changes count as well. Some of them are no jumps.
 
     Returns
     -------
@@ -189,10 +189,9 @@ def jump_sizes(
     rate = np.where(np.isnan(apart), alone, apart) / cells
     rate = np.pad(rate, 1, constant_values=np.nan)
     one, both = (of(rate[:-2], rate[2:]) * cells for of in (np.fmin, np.fmax))
-    if faint:
-        return np.where((apart > FAINTEST) & (apart > FAINT * both), apart, 0.0)
-    steep = (apart > STEEPEST * one) & (apart > STEEPER * both)
-    return np.where((apart > SMALLEST) & steep, apart, 0.0)
+    jump = (apart > SMALLEST) & (apart > STEEPEST * one) & (apart > STEEPER * both)
+    small = (apart > FAINTEST) & (apart > FAINT * both)
+    return np.where(jump | faint & small, apart, 0.0)
 
 
 def crises(result: Result) -> list[Crisis]:
