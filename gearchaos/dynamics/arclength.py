@@ -392,8 +392,25 @@ def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats
 
 
 def passes_half(here: OnCurve, trial: OnCurve) -> bool:
-    """Whether the orbit of half the period lies between two points: beyond it, phases swap."""
-    return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
+    """Whether the orbit of half the period lies between two points: beyond it, phases swap.
+
+    The second point may also be such an orbit.
+    """
+    if not here.halfway.size:
+        return False
+    return bool(np.max(np.abs(trial.halfway)) < SHORTER or here.halfway @ trial.halfway <= 0.0)
+
+
+def meets_half(here: OnCurve, trial: OnCurve) -> bool:
+    """Whether a curve meets that of the orbits of half the period between two points.
+
+    There the difference of both halves of the orbit shrinks to zero and changes its sign, while
+    their mean hardly changes. Otherwise a long step has come to another phase of the orbit.
+    """
+    if not passes_half(here, trial):
+        return False
+    moved = np.linalg.norm(trial.place - here.place)
+    return bool(moved <= np.linalg.norm(trial.halfway - here.halfway))
 
 
 def repeats_sooner(section: Floats, scale: Floats) -> bool:

@@ -9,7 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.dynamics.arclength import cubic, extended, passes_half, repeats_sooner, stalls
+from gearchaos.dynamics.arclength import (
+    cubic,
+    extended,
+    meets_half,
+    passes_half,
+    repeats_sooner,
+    stalls,
+)
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.side_by_side import together
@@ -143,8 +150,8 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
             half.end = HALVING if _nearly_half(points[-1]) else SHORT_STEPS
         elif len(points) == before:
             here, step = points[-1], step / 2.0
-            if trials[0] is not None and passes_half(here, trials[0]):
-                half.end = HALVING if _nearly_half(here) else ""
+            if _nearly_half(here) and trials[0] is not None and meets_half(here, trials[0]):
+                half.end = HALVING
             elif step < SHORTEST:
                 half.end = _why_lost(equations, here)
 

@@ -21,9 +21,11 @@ from gearchaos.dynamics.arclength import (
     along_the_way,
     cubic,
     extended,
+    meets_half,
     passes_half,
     stalls,
 )
+from gearchaos.dynamics.branch_corners import beyond_corner
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
@@ -32,6 +34,7 @@ from gearchaos.records.branch import (
     CLOSED_CURVE,
     EDGE,
     FOLD,
+    GROWS,
     HALVING,
     IN_ERRORS,
     LOST,
@@ -92,6 +95,12 @@ STALLED = (200, 1e-3)
 """Number of successive points of a curve, and the distance that they must cover at least.
 
 Where errors of a method fold a curve at the size of its jumps, it leads nowhere.
+"""
+
+FARTHEST = 100.0
+"""Largest state of an orbit, in the scales of the states.
+
+Next to a parametric resonance that nothing limits, orbits grow without bound.
 """
 
 SIDEWAYS = 2e-3
@@ -312,9 +321,10 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
     points, distances = [start], _distances(FIRST_STEP, curve.ahead)
     if (start.share <= 0.0 and not start.onward) or (start.share >= 1.0 and start.onward):
         return points, EDGE
+    corner = 0
     while len(points) < MOST_POINTS:
         here = points[-1]
-        trials, leaves = yield from _next(curve, points[-2:], distances)
+        trials, leaves = yield from _next(curve, points[corner:][-2:], distances)
         taken = 0
         while (further := _joinable(points[-1], trials[taken:])) is not None:
             here, last, taken = points[-1], further[-1], taken + len(further)
@@ -324,6 +334,8 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             points += further
         if taken and stalls(points, STALLED):
             return points, _end_of(curve, points[-1])
+        if taken and np.max(np.abs(points[-1].place[:-1])) > FARTHEST:
+            return points, GROWS
         if leaves and taken == len(trials):
             return points, EDGE
         first = trials[0]
@@ -331,12 +343,17 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             # Far beyond the first that fails, hardly any is found.
             distances = _distances(_after(here, points[-1]), min(taken + 3, curve.ahead))
             continue
-        if first is not None and _passes_half(here, first) and here.half_return < SIDEWAYS:
+        if here.half_return < SIDEWAYS and first is not None and meets_half(here, first):
             return points, HALVING
         longer = 0.5 if first is None else _boldness(here, first)
         distances = _shorter(float(distances[0]) * min(max(longer, 0.25), 0.8), curve.ahead)
         if distances[0] < SHORTEST_STEP:
-            return points, _end_of(curve, here)
+            beyond = yield from beyond_corner(curve, here)
+            if beyond is None:
+                return points, _end_of(curve, here)
+            corner = len(points)
+            points.append(beyond)
+            distances = _distances(FIRST_STEP, curve.ahead)
     return points, TOO_MANY
 
 
@@ -371,7 +388,7 @@ def _joinable(here: CurvePoint, trials: Sequence[CurvePoint | None]) -> list[Cur
     """Return the next points of a curve that a point may be joined to, or None."""
     found: list[CurvePoint] = []
     for trial in trials:
-        if trial is None or not _succeeds(here, trial) or _passes_half(here, trial):
+        if trial is None or not _succeeds(here, trial) or passes_half(here, trial):
             break
         found.append(trial)
     return found or None
@@ -456,11 +473,6 @@ def _boldness(here: CurvePoint, trial: CurvePoint) -> float:
     angle = np.arccos(np.clip(trial.tangent @ here.tangent, -1.0, 1.0))
     used = max(angle / np.arccos(SMOOTH), _change(here, trial) / CALM)
     return float(CAUTION / used) if used > 0.0 else np.inf
-
-
-def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
-    """Whether the orbit of half the period lies between two points or is the second one."""
-    return trial.half_return < SHORTER or passes_half(here, trial)
 
 
 def _before(end: CurvePoint, points: Sequence[CurvePoint]) -> list[CurvePoint]:

@@ -22,6 +22,7 @@ from gearchaos.records.branch import (
     BRANCH_POINT,
     FOLD,
     GRAZING,
+    GROWS,
     MEANINGS,
     NEIMARK_SACKER,
     PERIOD_DOUBLING,
@@ -112,7 +113,8 @@ def branch_overlay(found: BranchSet, name: str, between: Between = (None, None))
         rows = _rows(found, branch, name)
         for piece, stable in _pieces(branch):
             kind, look = (STABLE_ORBITS, STABLE) if stable else (UNSTABLE_ORBITS, UNSTABLE)
-            lines.append(OverlaidLine(kind, branch.value[piece], rows[piece], look))
+            line = OverlaidLine(kind, branch.value[piece], rows[piece], look, _grows(branch))
+            lines.append(line)
         points += _special_points(found, branch, name, between)
     there = {one.kind for one in lines} | {one.kind for one in points}
     order = [STABLE_ORBITS, UNSTABLE_ORBITS, *MARKERS]
@@ -122,16 +124,30 @@ def branch_overlay(found: BranchSet, name: str, between: Between = (None, None))
 def limits_with(
     over: Overlay, limits: tuple[float, float], between: Between = (None, None)
 ) -> tuple[float, float]:
-    """Return limits along y, extended to a margin beyond the lines between two values of x."""
-    heights = [one.y[_inside(one.x, between)].ravel() for one in over.lines]
-    there = np.concatenate([np.zeros(0), *heights])
-    there = there[np.isfinite(there)]
-    if not there.size:
-        return limits
-    low, high = limits
-    least, most = float(there.min()), float(there.max())
-    pad = 0.04 * (max(high, most) - min(low, least))
-    return min(low, least - pad), max(high, most + pad)
+    """Return limits along y, extended to a margin beyond the lines between two values of x.
+
+    For lines that grow far, they are extended by the height between them at most.
+    """
+    for grows in (False, True):
+        heights = [
+            one.y[_inside(one.x, between)].ravel() for one in over.lines if one.grows == grows
+        ]
+        there = np.concatenate([np.zeros(0), *heights])
+        there = there[np.isfinite(there)]
+        if not there.size:
+            continue
+        low, high = limits
+        least, most = float(there.min()), float(there.max())
+        if grows:
+            least, most = max(least, 2.0 * low - high), min(most, 2.0 * high - low)
+        pad = 0.04 * (max(high, most) - min(low, least))
+        limits = min(low, least - pad), max(high, most + pad)
+    return limits
+
+
+def _grows(branch: PeriodicBranch) -> bool:
+    """Whether a branch grows so far that a panel shows only a part of it."""
+    return GROWS in branch.ends
 
 
 def _inside(values: Any, between: Between) -> Any:
@@ -256,7 +272,8 @@ def branches_page(
         values = np.concatenate([one.value for one in found.branches])
         low, high = between
         upper.set_xlim(values.min() if low is None else low, values.max() if high is None else high)
-        rows = np.concatenate([_rows(found, one, name).ravel() for one in found.branches])
+        limited = [one for one in found.branches if not _grows(one)] or found.branches
+        rows = np.concatenate([_rows(found, one, name).ravel() for one in limited])
         upper.set_ylim(float(np.nanmin(rows)), float(np.nanmax(rows)))
         handles = draw_branches(upper, found, name, between=between)
         upper.set_xlabel(label_of(found.parameter))
@@ -270,14 +287,23 @@ def branches_page(
 
 
 def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Artist]:
-    """Draw the moduli of all multipliers over the arclength, one branch beside the other."""
+    """Draw the moduli of all multipliers over the arclength, one branch beside the other.
+
+    Of a branch that grows, as much is drawn as of the longest one that does not.
+    """
+    longest = max([float(one.arclength[-1]) for one in branches if not _grows(one)], default=np.inf)
     drawn: list[Artist] = [axes.axhline(1.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)))]
     offset, places, names = 0.0, [], []
     least = min(float(np.abs(one.multipliers).min()) for one in branches)
     for branch in branches:
-        moduli = np.maximum(np.abs(branch.multipliers), LEAST_MODULUS)
-        drawn += axes.plot(offset + branch.arclength, moduli, color="black", linewidth=0.6)
-        length = float(branch.arclength[-1])
+        far = (
+            branch.arclength if branch.ends[1] == GROWS else branch.arclength[-1] - branch.arclength
+        )
+        near = far <= longest if _grows(branch) else np.isfinite(far)
+        moduli = np.maximum(np.abs(branch.multipliers[near]), LEAST_MODULUS)
+        along = branch.arclength[near] - branch.arclength[near][0]
+        drawn += axes.plot(offset + along, moduli, color="black", linewidth=0.6)
+        length = float(along[-1])
         places.append(offset + length / 2.0)
         names.append(str(branch.period))
         offset += length

@@ -18,12 +18,15 @@ class OverlaidLine(NamedTuple):
         Values along the second axis.
     look : dict
         Colour, line style and line width, as matplotlib names them.
+    grows : bool
+        Whether it grows so far that a panel shows only a part of it.
     """
 
     kind: str
     x: Floats
     y: Floats
     look: dict[str, Any]
+    grows: bool = False
 
 
 class OverlaidPoint(NamedTuple):

@@ -26,7 +26,8 @@ HALVING = "meets the orbit of half its period"
 TOO_MANY = "too many points"
 LOST = "no orbit found however short the step"
 IN_ERRORS = "lost in the errors of the method: take shorter steps, or flow maps"
-BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST, IN_ERRORS)
+GROWS = "grows to 100 times the scale of its states"
+BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST, IN_ERRORS, GROWS)
 """Reasons why a branch ends."""
 
 STEPPED = "rk4"
