@@ -66,8 +66,8 @@ derivatives turn the tangent by much.
 LEAST_REACH = 1e-6
 """Distance from its prediction at which a point is accepted however short the step.
 
-Within `DIFFERENCE` of a grazing, the tangent of a curve of exact maps has large errors. Where the
-steps of a method with an error begin to see a contact, its curve jumps.
+Where the parameter changes flow maps, the tangent of a curve has large errors within `ONE_SIDED`
+of a grazing. Where the steps of a method with an error begin to see a contact, its curve jumps.
 """
 
 CALM = 0.5

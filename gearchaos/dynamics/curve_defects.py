@@ -13,8 +13,12 @@ from gearchaos.dynamics.side_by_side import Found, Search
 if TYPE_CHECKING:
     from gearchaos.dynamics.arclength import Curve
 
-DIFFERENCE = 1e-8
-"""Share of the way used for the difference quotient of the map by the parameter."""
+DIFFERENCE, ONE_SIDED = 1e-10, 1e-8
+"""Shares of the way used for the difference quotient of the map by the parameter.
+
+The first one is used on either side. Next to grazings second derivatives are large, the more so
+where the range of the parameter is wide.
+"""
 
 
 class Request(NamedTuple):
@@ -48,7 +52,7 @@ class Request(NamedTuple):
         if self.by_share is not None:
             return [share]
         if self.curve.own_maps:
-            return [share, share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)]
+            return [share, share + (ONE_SIDED if share < 0.5 else -ONE_SIDED)]
         return [share, min(share + DIFFERENCE, 1.0), max(share - DIFFERENCE, 0.0)]
 
 

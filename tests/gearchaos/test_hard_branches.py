@@ -10,7 +10,7 @@ import gearchaos
 from gearchaos.engine.branching import find_branches
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
-from gearchaos.records.branch import EDGE, GRAZING, PERIOD_DOUBLING
+from gearchaos.records.branch import EDGE, GRAZING, HALVING, PERIOD_DOUBLING
 
 MASS = """
 [model]
@@ -26,6 +26,7 @@ gap = {{ x = 1.0 }}
 stiffness = {stop}
 half_clearance = 1.0
 damping = {stop_damping}
+damping_acts = "{acts}"
 
 [force.one]
 on = {{ x = 1.0 }}
@@ -63,6 +64,7 @@ BASE = {
     "frequency": 1.0,
     "stop": 4.0,
     "stop_damping": 0.0,
+    "acts": "always",
     "mean": 0.0,
     "first": 0.6,
     "second": 0.0,
@@ -209,3 +211,41 @@ def test_a_sweep_of_one_value_has_no_branches():
     result = gearchaos.run(Configuration.from_toml(given))
     with pytest.raises(ConfigurationError, match="sweep has one value of mesh_frequency"):
         find_branches(result, "one.h5")
+
+
+def test_a_branch_goes_on_where_a_contact_begins_or_ends_at_mesh_phase_0():
+    """A phase of the only force shifts the time: the motion and its multipliers stay the same.
+
+    The damper of the stop acts in contact only, so that its force jumps.
+    """
+    changes = {"stop_damping": 3.0, "acts": "in_contact", "first": 2.5, "mean": 0.5}
+    (whole,) = branches(1, "force.one.phase_deg", 0.0, 360.0, **changes)
+    assert whole.ends == (EDGE, EDGE)
+    assert whole.value[[0, -1]].tolist() == [0.0, 360.0]
+    assert np.ptp(whole.multipliers, axis=0) == pytest.approx(0.0, abs=1e-11)
+    assert whole.section[-1] == pytest.approx(whole.section[0], abs=1e-11)
+
+
+def test_branches_do_not_depend_on_the_width_of_the_range():
+    """Motions that are small beside others of the sweep have orbits of two and four periods, too.
+
+    Their phases are close together in the scale of the sweep.
+    """
+    machine = {"stiffness": 0.234, "damping": 0.024, "stop": 1.341, "frequency": 1.187}
+    narrow, wide = (
+        branches(4, "force.one.amplitude", 0.0, width, **machine, mean=0.235, count=5)
+        for width in (2.0, 30.0)
+    )
+    assert [one.period for one in narrow] == [one.period for one in wide] == [1, 2, 4]
+    for one, other in zip(narrow[1:], wide[1:], strict=True):
+        assert one.ends == other.ends == (HALVING, HALVING)
+        assert other.value[[0, -1]] == pytest.approx(one.value[[0, -1]], abs=1e-3)
+    for one, other in zip(narrow, wide, strict=True):
+        doublings = [special_values(some, PERIOD_DOUBLING, below=2.0) for some in (one, other)]
+        assert len(doublings[0]) == 2
+        assert doublings[1] == pytest.approx(doublings[0], abs=1e-9)
+
+
+def special_values(branch, kind, below):
+    """Return the values at which a branch has special points of a kind, below a limit, in order."""
+    return sorted(one.value for one in branch.specials if one.kind == kind and one.value < below)
