@@ -405,7 +405,7 @@ def meets_half(here: OnCurve, trial: OnCurve) -> bool:
     """Whether a curve meets that of the orbits of half the period between two points.
 
     There the difference of both halves of the orbit shrinks to zero and changes its sign, while
-    their mean hardly changes. Otherwise a long step has come to another phase of the orbit.
+    their mean hardly changes. Otherwise a long step has led to another phase of the orbit.
     """
     if not passes_half(here, trial):
         return False

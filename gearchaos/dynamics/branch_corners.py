@@ -41,7 +41,7 @@ def beyond_corner(curve: Curve, here: CurvePoint) -> Finding[CurvePoint | None]:
             return None
         found = yield from curve.correcting(guess, here.tangent, fixed, reach=REACH * distance)
         if found is not None and _contact_changes(curve, here, found):
-            # The parameter goes on in its direction; the state may turn by any angle.
+            # The parameter keeps its direction; the state may turn by any angle.
             onward = np.sign(found.tangent[-1] * here.tangent[-1]) or 1.0
             return found._replace(tangent=onward * found.tangent)
     return None

@@ -97,10 +97,10 @@ STALLED = (200, 1e-3)
 Where errors of a method fold a curve at the size of its jumps, it leads nowhere.
 """
 
-FARTHEST = 100.0
-"""Largest state of an orbit, in the scales of the states.
+FARTHEST, UPRIGHT = 100.0, 1e-4
+"""Least state, and largest component of a tangent by the parameter, of a branch that grows.
 
-Next to a parametric resonance that nothing limits, orbits grow without bound.
+Next to a resonance that nothing limits, states grow beyond all bounds at one parameter.
 """
 
 SIDEWAYS = 2e-3
@@ -334,7 +334,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             points += further
         if taken and stalls(points, STALLED):
             return points, _end_of(curve, points[-1])
-        if taken and np.max(np.abs(points[-1].place[:-1])) > FARTHEST:
+        if taken and _grows(points[-1]):
             return points, GROWS
         if leaves and taken == len(trials):
             return points, EDGE
@@ -366,6 +366,12 @@ def _end_of(curve: Curve, here: CurvePoint) -> str:
     if here.half_return < SIDEWAYS:
         return HALVING
     return LOST if curve.exact else IN_ERRORS
+
+
+def _grows(point: CurvePoint) -> bool:
+    """Whether orbits grow beyond all others while the parameter hardly changes."""
+    largest = float(np.max(np.abs(point.place[:-1])))
+    return largest > FARTHEST and abs(float(point.tangent[-1])) < UPRIGHT
 
 
 def _distances(step: float, many: int) -> Floats:

@@ -10,7 +10,7 @@ import gearchaos
 from gearchaos.engine.branching import find_branches
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
-from gearchaos.records.branch import EDGE, GRAZING, HALVING, PERIOD_DOUBLING
+from gearchaos.records.branch import EDGE, GRAZING, GROWS, HALVING, PERIOD_DOUBLING
 
 MASS = """
 [model]
@@ -249,3 +249,21 @@ def test_branches_do_not_depend_on_the_width_of_the_range():
 def special_values(branch, kind, below):
     """Return the values at which a branch has special points of a kind, below a limit, in order."""
     return sorted(one.value for one in branch.specials if one.kind == kind and one.value < below)
+
+
+def test_a_branch_ends_where_its_orbits_grow_without_bound():
+    """A mass without damper, driven next to its natural frequency 1, far from its stops.
+
+    Its amplitude is 1 / (1 - frequency^2).
+    """
+    machine = {"stiffness": 1.0, "damping": 0.0, "first": 1.0}
+    text = MASS.format(**dict(BASE, **machine), swept="frequency", low=0.6, high=0.7)
+    text = text.replace("half_clearance = 1.0", "half_clearance = 1e6")
+    config = gearchaos.Configuration.from_toml(text, "mass.toml")
+    system = gearchaos.System(config, at={"frequency": 0.6})
+    small = 1.0 / 0.64
+    branch = system.branch(system.orbit(guess=np.array([small, 0.0])), "frequency", 0.55, 1.5)
+    assert branch.ends == (EDGE, GROWS)
+    amplitude = branch.section[-1, 0, 0]
+    assert 100.0 < amplitude / small < 110.0
+    assert amplitude == pytest.approx(1.0 / (1.0 - branch.value[-1] ** 2), rel=1e-9)
