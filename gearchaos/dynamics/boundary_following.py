@@ -19,6 +19,7 @@ from gearchaos.dynamics.arclength import (
 )
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
+from gearchaos.dynamics.corners import beyond_corner
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CORNER,
@@ -130,11 +131,12 @@ def _turned(point: OnBoundary) -> OnBoundary:
 
 def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Following[None]:
     """Follow a half up to its end, or until it meets another one."""
-    points, step = half.points, START_STEP
+    points, step, corner = half.points, START_STEP, 0
     while not half.end and half.met is None:
         going = sum(not one.end and one.met is None for one in halves)
         many = min(max(SIDE_BY_SIDE // going, 1), MOST_AHEAD)
-        trials, leaves = yield from _next(equations, points, step * np.arange(1.0, many + 1.0))
+        distances = step * np.arange(1.0, many + 1.0)
+        trials, leaves = yield from _next(equations, points[corner:], distances)
         if half.met is not None:
             return
         before = len(points)
@@ -153,7 +155,12 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
             if _nearly_half(here) and trials[0] is not None and meets_half(here, trials[0]):
                 half.end = HALVING
             elif step < SHORTEST:
-                half.end = _why_lost(equations, here)
+                beyond = yield from _beyond_corner(equations, here)
+                if beyond is None:
+                    half.end = _why_lost(equations, here)
+                    continue
+                corner, step = len(points), START_STEP
+                points.append(beyond)
 
 
 def _joined(
@@ -229,6 +236,16 @@ def _met(here: OnBoundary, trial: OnBoundary, half: _Half, halves: list[_Half]) 
         if np.min(np.linalg.norm(curve - target, axis=1)) < SAME_CURVE + 0.02 * np.sqrt(square):
             return ahead
     return None
+
+
+def _beyond_corner(equations: Equations, here: OnBoundary) -> Following[OnBoundary | None]:
+    """Search a point beyond a corner of the boundary."""
+
+    def correcting(guess: Floats, normal: Floats, reach: float) -> Following[OnBoundary | None]:
+        return equations.correcting(guess, normal, here.reference, reach=reach)
+
+    steps = equations.plan.steps_per_period
+    return (yield from beyond_corner(here, correcting, equations.system_at, steps))
 
 
 def _why_lost(equations: Equations, here: OnBoundary) -> str:

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import (
@@ -25,8 +26,8 @@ from gearchaos.dynamics.arclength import (
     passes_half,
     stalls,
 )
-from gearchaos.dynamics.branch_corners import beyond_corner
 from gearchaos.dynamics.branch_specials import LOCATED, specials_between, with_pairs_parted
+from gearchaos.dynamics.corners import beyond_corner
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.records.branch import (
@@ -348,13 +349,25 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
         longer = 0.5 if first is None else _boldness(here, first)
         distances = _shorter(float(distances[0]) * min(max(longer, 0.25), 0.8), curve.ahead)
         if distances[0] < SHORTEST_STEP:
-            beyond = yield from beyond_corner(curve, here)
+            beyond = yield from _beyond_corner(curve, here)
             if beyond is None:
                 return points, _end_of(curve, here)
             corner = len(points)
             points.append(beyond)
             distances = _distances(FIRST_STEP, curve.ahead)
     return points, TOO_MANY
+
+
+def _beyond_corner(curve: Curve, here: CurvePoint) -> Finding[CurvePoint | None]:
+    """Search a point beyond a corner of the curve."""
+
+    def correcting(guess: Floats, normal: Floats, reach: float) -> Finding[CurvePoint | None]:
+        return curve.correcting(guess, normal, reach=reach)
+
+    def systems_at(shares: Floats) -> LaneSystem:
+        return curve.systems_at(np.full(len(shares), curve.number), shares[:, 0])
+
+    return (yield from beyond_corner(here, correcting, systems_at, curve.plan.steps_per_period))
 
 
 def _end_of(curve: Curve, here: CurvePoint) -> str:

@@ -3,10 +3,66 @@
 Where an extreme reaches a flank, the orbit grazes it.
 """
 
-import numpy as np
-from gearchaos_kernels import Gaps, LaneSystem, Plan, gap_polynomials, gaps_along
+from typing import NamedTuple, Self
 
-from gearchaos.arrays import Floats, Integers
+import numpy as np
+from gearchaos_kernels import (
+    METHODS,
+    Gaps,
+    LaneSystem,
+    Plan,
+    gap_polynomials,
+    gaps_along,
+    integrate,
+)
+
+from gearchaos.arrays import Floats, Integers, Mask
+
+FINER, FINEST = 8, 3
+"""Factor by which steps are shortened where a contact changes before an extreme, and how often."""
+
+ALONG_STEP = np.linspace(0.0, 1.0, 9)
+"""Shares of the way to an extreme at which gaps of other elements are looked at."""
+
+
+class _Orbits(NamedTuple):
+    """Orbits as their states at every step, and their gaps there."""
+
+    system: LaneSystem
+    plan: Plan
+    history: Floats
+    gaps: Gaps
+
+    @classmethod
+    def of(cls, system: LaneSystem, plan: Plan, history: Floats) -> Self:
+        """Return orbits with their gaps; see `nearest_extremes`."""
+        gaps = gaps_along(system, history, plan.steps_per_period)
+        return cls(system, plan, history, gaps)
+
+    def terms(self, samples: Integers, element: int) -> Floats:
+        """Return polynomials of a gap in steps (lanes,), see `gap_polynomials`."""
+        return gap_polynomials(self.system, self.plan, self.history, self.gaps, (samples, element))
+
+    def finer(self, lanes: Integers) -> Self:
+        """Return some orbits with shorter steps."""
+        plan = self.plan._replace(steps_per_period=FINER * self.plan.steps_per_period)
+        system = self.system.of(lanes)
+        return self.of(system, plan, integrate(system, self.history[lanes, 0], plan).history)
+
+    def others_change(self, samples: Integers, element: int, at: Floats) -> Mask:
+        """Whether another element changes its contact within steps (lanes,) before places in them.
+
+        ``at``: the places, from -1 to 1, (lanes,).
+        """
+        places = -1.0 + ALONG_STEP[:, np.newaxis] * (at + 1.0)
+        changes = np.zeros(samples.size, dtype=bool)
+        for other in set(range(self.gaps.value.shape[2])) - {element}:
+            terms = self.terms(samples, other)
+            values = np.polynomial.polynomial.polyval(places, terms.T, tensor=False)
+            clearance = self.gaps.half_clearance[:, other]
+            sides = (values > clearance).astype(np.intp) - (values < -clearance)
+            changes |= np.any(sides != sides[0], axis=0)
+        return changes
 
 
 def nearest_extremes(
@@ -18,23 +74,38 @@ def nearest_extremes(
     phase in steps; where the phase is NaN, the one nearest to the flank. NaN where the gap has no
     extreme.
     """
-    gaps = gaps_along(system, history, plan.steps_per_period)
-    element = int(flanks[0]) // 2
-    flank, rate = _place_of(gaps, flanks), gaps.rate[:, :, element]
+    return _nearest(_Orbits.of(system, plan, history), flanks, phases, FINEST)
+
+
+def _nearest(
+    orbits: _Orbits, flanks: Integers, phases: Floats, levels: int
+) -> tuple[Floats, Floats]:
+    """Return the extremes of `nearest_extremes`.
+
+    The exact polynomial of a step holds until another element changes its contact. Where it does so
+    before the extreme, the orbit is integrated with shorter steps, ``levels`` times at most.
+    """
+    gaps, element = orbits.gaps, int(flanks[0]) // 2
     beyond = about_extremes(gaps, flanks)
     turns = np.isfinite(beyond)
     aside = np.abs(np.arange(turns.shape[1]) + 0.5 - phases[:, np.newaxis])
     aside = np.minimum(aside, turns.shape[1] - aside)
     away = np.where(np.isnan(aside), np.abs(beyond), aside)
     samples = np.argmin(np.where(turns, away, np.inf), axis=1)
-    terms = gap_polynomials(system, plan, history, gaps, (samples, element))
-    begin, end = (rate[np.arange(samples.size), samples + n] for n in (0, 1))
+    terms = orbits.terms(samples, element)
+    begin, end = (gaps.rate[np.arange(samples.size), samples + n, element] for n in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         at = np.clip(np.nan_to_num(-(end + begin) / (end - begin)), -1.0, 1.0)
     at = _turning(terms, at)
-    beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - flank
-    there = turns.any(axis=1)
-    return np.where(there, beyond, np.nan), samples + 0.5 * (at + 1.0)
+    beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - _place_of(gaps, flanks)
+    there, found = turns.any(axis=1), samples + 0.5 * (at + 1.0)
+    if levels and METHODS[orbits.plan.method].gap_terms is not None:
+        (late,) = np.nonzero(there & orbits.others_change(samples, element, at))
+        if late.size:
+            wanted = FINER * phases[late]
+            again = _nearest(orbits.finer(late), flanks[late], wanted, levels - 1)
+            beyond[late], found[late] = again[0], again[1] / FINER
+    return np.where(there, beyond, np.nan), found
 
 
 def about_extremes(gaps: Gaps, flanks: Integers) -> Floats:
