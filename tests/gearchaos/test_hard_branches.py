@@ -213,19 +213,6 @@ def test_a_sweep_of_one_value_has_no_branches():
         find_branches(result, "one.h5")
 
 
-def test_a_branch_goes_on_where_a_contact_begins_or_ends_at_mesh_phase_0():
-    """A phase of the only force shifts the time: the motion and its multipliers stay the same.
-
-    The damper of the stop acts in contact only, so that its force jumps.
-    """
-    changes = {"stop_damping": 3.0, "acts": "in_contact", "first": 2.5, "mean": 0.5}
-    (whole,) = branches(1, "force.one.phase_deg", 0.0, 360.0, **changes)
-    assert whole.ends == (EDGE, EDGE)
-    assert whole.value[[0, -1]].tolist() == [0.0, 360.0]
-    assert np.ptp(whole.multipliers, axis=0) == pytest.approx(0.0, abs=1e-11)
-    assert whole.section[-1] == pytest.approx(whole.section[0], abs=1e-11)
-
-
 def test_branches_do_not_depend_on_the_width_of_the_range():
     """Motions that are small beside others of the sweep have orbits of two and four periods, too.
 
