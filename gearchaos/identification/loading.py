@@ -110,8 +110,15 @@ def _unfit(config: Configuration, targets: Targets, source: str, values: Floats)
         return
     # A second sweep over the bounds is subject to the same rules as a free parameter.
     for number, free in enumerate(targets.parameter):
+        what = f"{source}: parameter[{number}]"
+        if free.name == config.sweep.parameter:
+            rule = f"is what {config.source} sweeps; name another parameter"
+            yield f'{what}: name = "{free.name}": {rule}'
+            continue
         bounds = {"parameter": free.name, "values": [free.low, free.high]}
-        yield from _refusals(config, f"{source}: parameter[{number}]", "second_sweep", bounds)
+        for text in _refusals(config, what, "second_sweep", bounds):
+            own = text.replace("second_sweep.parameter", "name")
+            yield own.replace("second_sweep.values", "low and high")
     places = {"parameter": config.sweep.parameter, "values": values.tolist()}
     yield from _refusals(config, f"{source}: observed places", "sweep", places)
 

@@ -44,8 +44,8 @@ def reach(tried: Tried, rungs: int) -> Reach:
 
     Labels change abruptly and chaos is judged from a short record, so that the misfit is not smooth
     on a small scale. The limit is therefore where the median of three neighbouring steps exceeds a
-    reference by one. The reference is the median misfit of the sets next to the centre or the
-    misfit of the centre, whichever is larger.
+    reference by one, interpolated between two steps. The reference is the median misfit of the sets
+    next to the centre or the misfit of the centre, whichever is larger.
     """
     parameters = tried["values"].shape[1]
     alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
@@ -57,13 +57,27 @@ def reach(tried: Tried, rungs: int) -> Reach:
     surroundings = float(np.median(misfit[..., :NEAREST]))
     padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
     median = np.median(sliding_window_view(padded, 3, axis=2), axis=3)
-    too_far = median > max(surroundings, tried["misfit"][steps[0]]) + ONE_UNIT
-    # The last step within the limit; 0 is the centre.
-    last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), rungs)
-    number = np.arange(parameters)[:, np.newaxis]
-    row = np.where(last > 0, rungs * (2 * number + [0, 1]) + last, 0)
-    alone = tried["values"][steps[row], number]
+    reference = max(surroundings, float(tried["misfit"][steps[0]]))
+    values = tried["values"][steps]
+    alone = np.empty((parameters, 2))
+    for number, side in np.ndindex(alone.shape):
+        first = 1 + rungs * (2 * number + side)
+        along = np.append(values[0, number], values[first : first + rungs, number])
+        above = np.append(reference, median[number, side]) - (reference + ONE_UNIT)
+        alone[number, side] = _first_zero(along, above)
     return Reach(alone, among, surroundings)
+
+
+def _first_zero(along: Floats, above: Floats) -> float:
+    """Return where a function of some values along a line first passes zero, or the last value.
+
+    ``above``: the function, negative at the first value.
+    """
+    if not np.any(above > 0.0):
+        return float(along[-1])
+    beyond = int(np.argmax(above > 0.0))
+    some = slice(beyond - 1, beyond + 1)
+    return float(np.interp(0.0, above[some], along[some]))
 
 
 def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
@@ -164,7 +178,10 @@ def _points(problem: Problem, values: Floats) -> Floats:
 
 
 def _row(name: str, entries: Iterable[str | float]) -> str:
-    cells = (
-        f"{one:>{COLUMN}}" if isinstance(one, str) else f"{one:{COLUMN}.5g}" for one in entries
-    )
+    cells = (f"{one:>{COLUMN}}" if isinstance(one, str) else _number(one) for one in entries)
     return f"{name:{LABEL}}{''.join(cells)}"
+
+
+def _number(value: float) -> str:
+    """Word a number in a column; a dash where there is none."""
+    return f"{'-':>{COLUMN}}" if np.isnan(value) else f"{value:{COLUMN}.5g}"

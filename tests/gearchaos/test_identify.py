@@ -15,7 +15,7 @@ from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.search import budget_of, decisive_facts, judge
+from gearchaos.identification.search import budget_of, decisive_facts, judge, steps_alone
 from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 
@@ -185,6 +185,19 @@ class TestALinearPair:
         assert len(tried) <= 360
 
 
+def test_the_range_of_a_parameter_ends_between_two_steps():
+    """The misfit grows by one at a distance of 0.3 from the centre."""
+    rungs = 8
+    places = np.ravel(steps_alone(np.array([0.5]), rungs))
+    tried = np.zeros(places.size, [("run", float), ("values", float, (1,)), ("misfit", float)])
+    tried["run"], tried["values"][:, 0] = -1.0, places
+    tried["misfit"] = ((places - 0.5) / 0.3) ** 2
+    found = reach(tried, rungs)
+
+    assert found.alone[0, 1] - 0.5 == pytest.approx(0.3, rel=0.1)
+    assert 0.5 - found.alone[0, 0] == pytest.approx(0.3, rel=0.1)
+
+
 class TestASearchThatWasStopped:
     def test_goes_on_to_the_same_candidates(self, identified, tmp_path):
         problem, (whole, _) = problem_of(identified), tried_of(identified)
@@ -254,8 +267,7 @@ FAULTS = {
     ),
     'name = "damping_ratio"': (
         'name = "dampng_ratio"',
-        'parameter[0]: second_sweep.parameter = "dampng_ratio": is not a parameter that can be '
-        "swept; did you mean",
+        'parameter[0]: name = "dampng_ratio": is not a parameter that can be swept; did you mean',
     ),
     "low = 0.01": ("low = 0.0", "parameter[0]: low = 0.0 has no logarithm"),
     "high = 0.5": ("high = 0.005", "parameter[0]: high = 0.005 must be greater than low"),
