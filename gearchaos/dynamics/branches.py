@@ -107,6 +107,18 @@ Next to a resonance that nothing limits, states grow beyond all bounds at one pa
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
 
+NEARLY_HALF = 1e-4, 3e-4
+"""Difference of both halves of an orbit at which its curve ends in orbits of half the period.
+
+The second one is for curves along which every point has flow maps of its own: their derivatives by
+the parameter are less accurate.
+"""
+HALVED = 0.3
+"""Share of its largest value to which the difference of both halves of an orbit shrinks at least.
+
+Else a curve that is lost has not come near to the orbit of half its period.
+"""
+
 AMPLITUDES = SIDEWAYS * np.array([1.0, -1.0, 0.3, -0.3, 0.1, 0.03, 0.01])
 """Distances at which a doubled branch is searched, one after the other."""
 
@@ -323,6 +335,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
     if (start.share <= 0.0 and not start.onward) or (start.share >= 1.0 and start.onward):
         return points, EDGE
     corner = 0
+    near = NEARLY_HALF[curve.own_maps] if curve.exact else SIDEWAYS
     while len(points) < MOST_POINTS:
         here = points[-1]
         trials, leaves = yield from _next(curve, points[corner:][-2:], distances)
@@ -334,7 +347,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
                 return [*points, *_before(met, further), met], CLOSED_CURVE
             points += further
         if taken and stalls(points, STALLED):
-            return points, _end_of(curve, points[-1])
+            return points, _end_of(curve, points)
         if taken and _grows(points[-1]):
             return points, GROWS
         if leaves and taken == len(trials):
@@ -344,14 +357,14 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             # Far beyond the first that fails, hardly any is found.
             distances = _distances(_after(here, points[-1]), min(taken + 3, curve.ahead))
             continue
-        if here.half_return < SIDEWAYS and first is not None and meets_half(here, first):
+        if here.half_return < near and first is not None and meets_half(here, first):
             return points, HALVING
         longer = 0.5 if first is None else _boldness(here, first)
         distances = _shorter(float(distances[0]) * min(max(longer, 0.25), 0.8), curve.ahead)
         if distances[0] < SHORTEST_STEP:
             beyond = yield from _beyond_corner(curve, here)
             if beyond is None:
-                return points, _end_of(curve, here)
+                return points, _end_of(curve, points)
             corner = len(points)
             points.append(beyond)
             distances = _distances(FIRST_STEP, curve.ahead)
@@ -370,13 +383,14 @@ def _beyond_corner(curve: Curve, here: CurvePoint) -> Finding[CurvePoint | None]
     return (yield from beyond_corner(here, correcting, systems_at, curve.plan.steps_per_period))
 
 
-def _end_of(curve: Curve, here: CurvePoint) -> str:
-    """Return why a curve ends that is not found beyond a point.
+def _end_of(curve: Curve, points: Sequence[CurvePoint]) -> str:
+    """Return why a curve ends that is not found beyond its last point.
 
     Errors of a method bend or hide the last part of a curve that has nearly reached the orbit of
     half its period.
     """
-    if here.half_return < SIDEWAYS:
+    apart = [one.half_return for one in points]
+    if apart[-1] < min(SIDEWAYS, HALVED * max(apart)):
         return HALVING
     return LOST if curve.exact else IN_ERRORS
 

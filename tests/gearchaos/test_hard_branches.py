@@ -233,6 +233,21 @@ def test_branches_do_not_depend_on_the_width_of_the_range():
         assert doublings[1] == pytest.approx(doublings[0], abs=1e-9)
 
 
+def test_every_branch_that_meets_orbits_of_half_its_period_ends_at_a_doubling():
+    """The range is wide: between a doubling and the next one, orbits change little."""
+    machine = {"stiffness": 0.246, "damping": 0.098, "stop": 7.284, "frequency": 0.953}
+    found = branches(4, "force.one.amplitude", 0.0, 30.0, **machine, mean=0.493, count=5)
+    met = 0
+    for branch in found:
+        halves = [one for one in found if 2 * one.period == branch.period]
+        doublings = [s.value for one in halves for s in one.specials if s.kind == PERIOD_DOUBLING]
+        for reason, end in zip(branch.ends, branch.value[[0, -1]], strict=True):
+            if reason == HALVING:
+                assert np.min(np.abs(np.array(doublings) - end)) < 1e-3
+                met += 1
+    assert met > 20
+
+
 def special_values(branch, kind, below):
     """Return the values at which a branch has special points of a kind, below a limit, in order."""
     return sorted(one.value for one in branch.specials if one.kind == kind and one.value < below)
