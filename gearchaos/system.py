@@ -525,7 +525,7 @@ class System:
         Returns
         -------
         float
-            The sum.
+            The sum; NaN with friction and a damper that acts in contact only, if contact is lost.
 
         Notes
         -----

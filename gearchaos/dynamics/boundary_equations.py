@@ -19,7 +19,7 @@ from gearchaos.dynamics.boundary_passages import (
     passed_of,
 )
 from gearchaos.dynamics.boundary_tests import CRITICAL, Reference, pairs
-from gearchaos.dynamics.gap_extremes import nearest_extremes
+from gearchaos.dynamics.gap_extremes import FINE, nearest_extremes
 from gearchaos.dynamics.orbits import CLOSED
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import GRAZING, NEIMARK_SACKER
@@ -255,7 +255,10 @@ class Equations(NamedTuple):
         )
 
     def grazing(self, flank: int, steps: int) -> Self:
-        """Return the equations of the grazing of a flank, with the steps that the method takes."""
-        whole = self.plan.recorded_periods
+        """Return the equations of the grazing of a flank, with the steps that the method takes.
+
+        Within a few long steps, a gap may have several extremes: there are more.
+        """
+        whole, steps = self.plan.recorded_periods, steps * -(-FINE // steps)
         plan = self.plan._replace(history_periods=whole, steps_per_period=steps)
         return self._replace(kind=GRAZING, flank=flank, plan=plan)

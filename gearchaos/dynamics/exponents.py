@@ -139,7 +139,8 @@ def sum_of_exponents(system: LaneSystem, contact: Floats | None = None) -> Float
     Returns
     -------
     array, shape (lanes,)
-        Sum per unit of tau; NaN if it depends on shares of contact that are not given.
+        Sum per unit of tau; NaN if it depends on shares of contact that are not given, or with
+        friction on the phases of contact.
 
     Notes
     -----
@@ -161,7 +162,11 @@ def sum_of_exponents(system: LaneSystem, contact: Floats | None = None) -> Float
         apart = touching.copy()
         apart[:, element] = 0.0
         lost = np.trace(jacobian(system, apart), axis1=1, axis2=2) - trace
-        total += lost * (1.0 - (np.nan if contact is None else contact[:, element]))
+        share = np.full(system.lanes, np.nan) if contact is None else contact[:, element]
+        if system.damping_changes:
+            # The phases at which the element is in contact matter, unless it always or never is.
+            share = np.where((share > 0.0) & (share < 1.0), np.nan, share)
+        total += lost * (1.0 - share)
     return total
 
 

@@ -18,6 +18,9 @@ from gearchaos_kernels import (
 
 from gearchaos.arrays import Floats, Integers, Mask
 
+FINE = 48
+"""Fewest steps per period with which all extremes of a gap are searched."""
+
 FINER, FINEST = 8, 3
 """Factor by which steps are shortened where a contact changes before an extreme, and how often."""
 

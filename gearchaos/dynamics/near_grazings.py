@@ -14,7 +14,7 @@ from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_tak
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint
-from gearchaos.dynamics.gap_extremes import about_extremes, nearest_extremes
+from gearchaos.dynamics.gap_extremes import FINE, about_extremes, nearest_extremes
 from gearchaos.dynamics.pairs_parting import nearly_zero
 
 TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
@@ -22,9 +22,6 @@ TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
 
 MOST_NUMBERS = 4_000_000
 """Largest number of values in the histories of some orbits."""
-
-FINE = 48
-"""Fewest steps per period with which extremes are searched, where steps need no maps."""
 
 
 class _Orbits(NamedTuple):

@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 import gearchaos
+from gearchaos.dynamics.exponents import sum_of_exponents
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
@@ -106,3 +107,17 @@ def test_friction_without_a_coefficient_names_the_keys_that_give_it():
     with pytest.raises(ConfigurationError, match="give friction_coefficient in") as caught:
         Configuration.from_toml(text)
     assert "by giving mesh.friction_coefficient" in str(caught.value)
+
+
+def test_the_sum_of_exponents_is_not_given_where_it_depends_on_phases_of_contact():
+    """A damper that acts in contact only has another share in it where friction pushes or pulls."""
+    system = Lanes(Configuration.from_toml(SPUR, "spur.toml")).system_of(np.array([0, 1]))
+    assert np.isfinite(sum_of_exponents(system)).all()
+    text = (
+        SPUR.replace("[scene]", "half_backlash = 1.0\n[scene]")
+        + '[mesh]\ndamping_acts = "in_contact"\n'
+    )
+    system = Lanes(Configuration.from_toml(text, "spur.toml")).system_of(np.array([0, 1]))
+    shares = np.array([[1.0], [0.7]])
+    found = sum_of_exponents(system, shares)
+    assert np.isfinite(found[0]) and np.isnan(found[1])

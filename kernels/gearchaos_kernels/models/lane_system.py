@@ -136,6 +136,11 @@ class LaneSystem(ABC):
         return tuple(kind.damped_in_contact and self.clearance for kind in kinds)
 
     @property
+    def damping_changes(self) -> bool:
+        """Whether the effect of dampers changes with the mesh phase, by default False."""
+        return False
+
+    @property
     def repeats_after(self) -> int:
         """Number of mesh periods after which the excitation repeats, by default 1."""
         return 1

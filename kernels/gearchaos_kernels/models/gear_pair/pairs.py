@@ -103,6 +103,11 @@ class GearPairs(LaneSystem):
         return 2.0 * np.pi / self.groups.mesh_frequency
 
     @property
+    def damping_changes(self) -> bool:
+        """Whether the effect of dampers changes with the mesh phase: that of friction does."""
+        return self.effects.friction
+
+    @property
     def repeats_after(self) -> int:
         """Mesh periods after which the excitation repeats; with teeth, until the same two meet."""
         if self.teeth is None or not self.effects.pitch_error:
