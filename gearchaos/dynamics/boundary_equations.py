@@ -195,7 +195,7 @@ class Equations(NamedTuple):
         # Flow maps take shorter steps at some values of the parameters.
         plan = self.plan._replace(
             history_periods=self.plan.recorded_periods,
-            steps_per_period=steps_taken(system, self.plan),
+            steps_per_period=_finer(steps_taken(system, self.plan)),
         )
         start = (place[:states] * self.scale)[np.newaxis]
         history = integrate(system, start, plan).history
@@ -259,6 +259,11 @@ class Equations(NamedTuple):
 
         Within a few long steps, a gap may have several extremes: there are more.
         """
-        whole, steps = self.plan.recorded_periods, steps * -(-FINE // steps)
+        whole, steps = self.plan.recorded_periods, _finer(steps)
         plan = self.plan._replace(history_periods=whole, steps_per_period=steps)
         return self._replace(kind=GRAZING, flank=flank, plan=plan)
+
+
+def _finer(steps: int) -> int:
+    """Return a multiple of a number of steps per period that is at least `FINE`."""
+    return steps * -(-FINE // steps)
