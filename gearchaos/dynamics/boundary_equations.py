@@ -24,6 +24,9 @@ from gearchaos.dynamics.orbits import CLOSED
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import GRAZING, NEIMARK_SACKER
 
+ACROSS = 4
+"""Factor by which steps are shortened where the nearest of all extremes is searched."""
+
 STEPS, CONTRACTION = 12, 0.1
 """Most Newton steps, and the ratio of two lengths above which derivatives are computed anew."""
 
@@ -195,7 +198,7 @@ class Equations(NamedTuple):
         # Flow maps take shorter steps at some values of the parameters.
         plan = self.plan._replace(
             history_periods=self.plan.recorded_periods,
-            steps_per_period=_finer(steps_taken(system, self.plan)),
+            steps_per_period=ACROSS * _finer(steps_taken(system, self.plan)),
         )
         start = (place[:states] * self.scale)[np.newaxis]
         history = integrate(system, start, plan).history

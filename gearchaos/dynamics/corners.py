@@ -78,11 +78,15 @@ def beyond_corner(
     number = states + int(np.argmax(np.abs(here.tangent[states:])))
     normal = np.zeros_like(here.place)
     normal[number] = np.sign(here.tangent[number]) or 1.0
+    beyond = None
     for distance in BEYOND:
         guess = here.place + distance * here.tangent
         if np.any((guess[states:] < 0.0) | (guess[states:] > 1.0)):
-            return None
+            break
         found = yield from correcting(guess, normal, REACH * distance)
         if found is not None and np.any(flanks(found) != flanks(here)):
-            return found
-    return None
+            if beyond is not None:
+                # Differences for the tangent of the first one may reach across the corner.
+                return found
+            beyond = found
+    return beyond
