@@ -113,10 +113,9 @@ def test_the_sum_of_exponents_is_not_given_where_it_depends_on_phases_of_contact
     """A damper that acts in contact only has another share in it where friction pushes or pulls."""
     system = Lanes(Configuration.from_toml(SPUR, "spur.toml")).system_of(np.array([0, 1]))
     assert np.isfinite(sum_of_exponents(system)).all()
-    text = (
-        SPUR.replace("[scene]", "half_backlash = 1.0\n[scene]")
-        + '[mesh]\ndamping_acts = "in_contact"\n'
-    )
+    text = SPUR.replace("[scene]", "half_backlash = 1.0\n[scene]")
+    text = text.replace('["friction"]', '["friction", "backlash"]')
+    text += '[mesh]\ndamping_acts = "in_contact"\n'
     system = Lanes(Configuration.from_toml(text, "spur.toml")).system_of(np.array([0, 1]))
     shares = np.array([[1.0], [0.7]])
     found = sum_of_exponents(system, shares)

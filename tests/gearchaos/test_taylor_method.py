@@ -83,6 +83,13 @@ def test_a_gear_pair_is_refused_with_a_remedy():
     ) in str(refused.value)
 
 
+def test_a_gear_pair_with_friction_is_referred_to_the_method_that_knows_it():
+    effects = "scene.effects=['pitch_error', 'friction']"
+    with pytest.raises(ConfigurationError) as refused:
+        gearchaos.load_config(PAN2021, ["integration.method='taylor'", effects])
+    assert 'set it to "rk4"' in str(refused.value)
+
+
 def test_a_gear_pair_hears_nothing_of_methods_for_machines():
     _, note = with_method(gearchaos.load_config(PAN2021, ["integration.method='auto'"]))
     assert "taylor" not in note

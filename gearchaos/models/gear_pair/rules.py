@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.methods import EXACT, METHODS
+from gearchaos.configuration.methods import DEFAULT, EXACT, METHODS
 from gearchaos.configuration.rules import Rules
 from gearchaos.models.gear_pair.derivation import BACKLASHES, Quantities
 from gearchaos.models.gear_pair.geometry_faults import geometry_faults
@@ -22,12 +22,13 @@ GEOMETRY = ("profile_shift", "centre_distance_mm", "tip_diameters_mm", "contact_
 RULES = Rules()
 
 
-@RULES.reads("integration")
+@RULES.reads("integration", "scene")
 def _series_are_for_machines(config: GearPairTables) -> Iterator[Fault]:
     method = config.integration.method
     if METHODS[method].for_machines:
         rule = 'is for machines: model.kind = "linear" or "train"'
-        yield Fault("integration.method", rule, f'set it to "{EXACT.name}"', method)
+        known = DEFAULT if "friction" in config.scene.effects else EXACT
+        yield Fault("integration.method", rule, f'set it to "{known.name}"', method)
 
 
 @RULES.reads("mesh")
