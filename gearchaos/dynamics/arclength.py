@@ -12,7 +12,7 @@ import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
-from gearchaos.dynamics.curve_defects import Defect, Finding, Request, defects_of
+from gearchaos.dynamics.curve_defects import ONE_SIDED, Defect, Finding, Request, defects_of
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS, ROUNDING_OF_STATES
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.period import TOLERANCE, coordinate_scale
@@ -168,6 +168,8 @@ class Curve(NamedTuple):
         Number of points that are predicted and corrected side by side.
     own_maps : bool
         Whether every value of the parameter has flow maps of its own.
+    difference : float
+        Share of the way used on either side for the difference quotient by the parameter.
     """
 
     systems_at: Callable[[Integers, Floats], LaneSystem]
@@ -177,6 +179,7 @@ class Curve(NamedTuple):
     scale: Floats
     ahead: int = 1
     own_maps: bool = False
+    difference: float = ONE_SIDED
 
     @property
     def exact(self) -> bool:

@@ -8,12 +8,16 @@ from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
+from gearchaos.dynamics.curve_defects import ONE_SIDED
 
 LANES_AHEAD, MOST_AHEAD = 64, 4
 """About how many lanes may search the points ahead of one, and the largest number of points."""
 
 WITH_OWN_MAPS = 2
 """Number of points ahead where each has flow maps of its own, which cost more than their lanes."""
+
+LEAST_DIFFERENCE, DIGITS = 1e-10, 1e-12
+"""Least share of the way by which values differ, and their least relative difference."""
 
 PLACES = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of the way at which the method is looked at."""
@@ -89,4 +93,14 @@ class BranchRange(NamedTuple):
         plan = plan._replace(steps_per_period=steps).over(whole)
         plan = plan._replace(contact=True, interpolated=along)
         ahead = min(max(ahead, 1), MOST_AHEAD)
-        return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)
+        way = Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)
+        return way._replace(difference=self._difference())
+
+    def _difference(self) -> float:
+        """Return the share of the way for difference quotients by the parameter.
+
+        Next to grazings, second derivatives are large, the more so where the range is wide. Where
+        it is narrow, values have few digits left in which they differ.
+        """
+        size = max(abs(self.low), abs(self.high)) / abs(self.high - self.low)
+        return float(np.clip(DIGITS * size, LEAST_DIFFERENCE, ONE_SIDED))

@@ -282,6 +282,11 @@ def _with_specials(
             located_between[at] = [
                 one for one in located_between[at] if one[0] not in (FOLD, BRANCH_POINT)
             ]
+    # Where a branch begins at a period doubling, it turns back, too: that is no fold.
+    located_between = [
+        [one for one in some if one[0] not in (FOLD, BRANCH_POINT) or not _begins_at(one[1])]
+        for some in located_between
+    ]
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
     for other, between in zip(points[1:], located_between, strict=True):
@@ -296,6 +301,11 @@ def _with_specials(
         Special(kind, point, flank, float(positions[at])) for at, (kind, point, flank) in found
     ]
     return TracedBranch(curve, joined, places, positions, specials, ends)
+
+
+def _begins_at(point: CurvePoint) -> bool:
+    """Whether an orbit is that of half the period, up to the distance to which it is followed."""
+    return point.half_return < NEARLY_HALF[0]
 
 
 def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | None]:

@@ -13,12 +13,8 @@ from gearchaos.dynamics.side_by_side import Found, Search
 if TYPE_CHECKING:
     from gearchaos.dynamics.arclength import Curve
 
-DIFFERENCE, ONE_SIDED = 1e-10, 1e-8
-"""Shares of the way used for the difference quotient of the map by the parameter.
-
-The first one is used on either side. Next to grazings second derivatives are large, the more so
-where the range of the parameter is wide.
-"""
+ONE_SIDED = 1e-8
+"""Share of the way used for the difference quotient of the map by the parameter on one side."""
 
 
 class Request(NamedTuple):
@@ -53,7 +49,8 @@ class Request(NamedTuple):
             return [share]
         if self.curve.own_maps:
             return [share, share + (ONE_SIDED if share < 0.5 else -ONE_SIDED)]
-        return [share, min(share + DIFFERENCE, 1.0), max(share - DIFFERENCE, 0.0)]
+        beside = self.curve.difference
+        return [share, min(share + beside, 1.0), max(share - beside, 0.0)]
 
 
 class Defect(NamedTuple):
