@@ -113,6 +113,7 @@ NEARLY_HALF = 1e-4, 3e-4
 The second one is for curves along which every point has flow maps of its own: their derivatives by
 the parameter are less accurate.
 """
+
 HALVED = 0.3
 """Share of its largest value to which the difference of both halves of an orbit shrinks at least.
 
@@ -356,7 +357,7 @@ def _half(curve: Curve, start: CurvePoint) -> Finding[tuple[list[CurvePoint], st
             if met is not None:
                 return [*points, *_before(met, further), met], CLOSED_CURVE
             points += further
-        if taken and stalls(points, STALLED):
+        if (taken or corner) and stalls(points, STALLED):
             return points, _end_of(curve, points)
         if taken and _grows(points[-1]):
             return points, GROWS
