@@ -12,7 +12,7 @@ import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats, Integers
-from gearchaos.dynamics.curve_defects import ONE_SIDED, Defect, Finding, Request, defects_of
+from gearchaos.dynamics.curve_defects import DIFFERENCE, Defect, Finding, Request, defects_of
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS, ROUNDING_OF_STATES
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.period import TOLERANCE, coordinate_scale
@@ -179,7 +179,7 @@ class Curve(NamedTuple):
     scale: Floats
     ahead: int = 1
     own_maps: bool = False
-    difference: float = ONE_SIDED
+    difference: float = DIFFERENCE
 
     @property
     def exact(self) -> bool:

@@ -23,7 +23,7 @@ from gearchaos.dynamics.boundary_tests import (
     solved,
     tests_of,
 )
-from gearchaos.dynamics.curve_defects import ONE_SIDED
+from gearchaos.dynamics.curve_defects import DIFFERENCE
 from gearchaos.dynamics.gap_extremes import nearest_extremes
 from gearchaos.dynamics.side_by_side import Found, Search
 from gearchaos.records.branch import GRAZING
@@ -140,7 +140,7 @@ class _Places(NamedTuple):
         column = np.arange(of.size) - first[of]
         shares = np.clip(own[:, -PARAMETERS:], 0.0, 1.0)
         steps = np.full(own.shape, STATE_DIFFERENCE)
-        steps[:, -PARAMETERS:] = np.where(shares < 0.5, ONE_SIDED, -ONE_SIDED)
+        steps[:, -PARAMETERS:] = np.where(shares < 0.5, DIFFERENCE, -DIFFERENCE)
         places = own[of]
         (beside,) = np.nonzero(column)
         which, by = of[beside], column[beside] - 1

@@ -8,7 +8,7 @@ from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
-from gearchaos.dynamics.curve_defects import ONE_SIDED
+from gearchaos.dynamics.curve_defects import DIFFERENCE
 
 LANES_AHEAD, MOST_AHEAD = 64, 4
 """About how many lanes may search the points ahead of one, and the largest number of points."""
@@ -103,4 +103,4 @@ class BranchRange(NamedTuple):
         it is narrow, values have few digits left in which they differ.
         """
         size = max(abs(self.low), abs(self.high)) / abs(self.high - self.low)
-        return float(np.clip(DIGITS * size, LEAST_DIFFERENCE, ONE_SIDED))
+        return float(np.clip(DIGITS * size, LEAST_DIFFERENCE, DIFFERENCE))

@@ -13,8 +13,11 @@ from gearchaos.dynamics.side_by_side import Found, Search
 if TYPE_CHECKING:
     from gearchaos.dynamics.arclength import Curve
 
-ONE_SIDED = 1e-8
-"""Share of the way used for the difference quotient of the map by the parameter on one side."""
+DIFFERENCE, ONE_SIDED = 1e-8, 1e-9
+"""Shares of the way used for the difference quotient of the map by the parameter.
+
+The second one is for one side. Next to grazings second derivatives are large.
+"""
 
 
 class Request(NamedTuple):
