@@ -351,7 +351,8 @@ def along_the_way(states: int) -> Floats:
 class OnCurve(Protocol):
     """A point of a curve: its place, and the unit vector in which the curve is followed.
 
-    ``halfway``: how far the orbit is from itself after half the period, empty for odd periods.
+    ``halfway``: how far the orbit is from itself after half the period, empty for odd periods;
+    ``section``: its states at the ends of the excitation periods, (periods, states).
     """
 
     @property
@@ -360,6 +361,8 @@ class OnCurve(Protocol):
     def tangent(self) -> Floats: ...
     @property
     def halfway(self) -> Floats: ...
+    @property
+    def section(self) -> Floats: ...
 
 
 def extended(last: Sequence[OnCurve], distances: Floats) -> tuple[Floats, Floats]:

@@ -19,7 +19,7 @@ from gearchaos.dynamics.boundary_passages import (
     passed_of,
 )
 from gearchaos.dynamics.boundary_tests import CRITICAL, Reference, pairs
-from gearchaos.dynamics.gap_extremes import FINE, nearest_extremes
+from gearchaos.dynamics.gap_extremes import fine_steps, nearest_extremes
 from gearchaos.dynamics.orbits import CLOSED
 from gearchaos.dynamics.side_by_side import run
 from gearchaos.records.branch import GRAZING, NEIMARK_SACKER
@@ -198,7 +198,7 @@ class Equations(NamedTuple):
         # Flow maps take shorter steps at some values of the parameters.
         plan = self.plan._replace(
             history_periods=self.plan.recorded_periods,
-            steps_per_period=ACROSS * _finer(steps_taken(system, self.plan)),
+            steps_per_period=ACROSS * fine_steps(steps_taken(system, self.plan)),
         )
         start = (place[:states] * self.scale)[np.newaxis]
         history = integrate(system, start, plan).history
@@ -262,11 +262,6 @@ class Equations(NamedTuple):
 
         Within a few long steps, a gap may have several extremes: there are more.
         """
-        whole, steps = self.plan.recorded_periods, _finer(steps)
+        whole, steps = self.plan.recorded_periods, fine_steps(steps)
         plan = self.plan._replace(history_periods=whole, steps_per_period=steps)
         return self._replace(kind=GRAZING, flank=flank, plan=plan)
-
-
-def _finer(steps: int) -> int:
-    """Return a multiple of a number of steps per period that is at least `FINE`."""
-    return steps * -(-FINE // steps)

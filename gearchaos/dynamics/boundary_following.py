@@ -158,9 +158,9 @@ def _advance(equations: Equations, half: _Half, halves: list[_Half]) -> Followin
                 beyond = yield from _beyond_corner(equations, here)
                 if beyond is None:
                     half.end = _why_lost(equations, here)
-                    continue
-                corner, step = len(points), START_STEP
-                points.append(beyond)
+                else:
+                    corner, step = len(points), START_STEP
+                    points.append(beyond)
 
 
 def _joined(

@@ -93,8 +93,8 @@ class BranchRange(NamedTuple):
         plan = plan._replace(steps_per_period=steps).over(whole)
         plan = plan._replace(contact=True, interpolated=along)
         ahead = min(max(ahead, 1), MOST_AHEAD)
-        way = Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps)
-        return way._replace(difference=self._difference())
+        beside = self._difference()
+        return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps, beside)
 
     def _difference(self) -> float:
         """Return the share of the way for difference quotients by the parameter.

@@ -98,7 +98,7 @@ STALLED = (200, 1e-3)
 Where errors of a method fold a curve at the size of its jumps, it leads nowhere.
 """
 
-FARTHEST, UPRIGHT = 100.0, 1e-4
+FARTHEST, HARDLY_MOVES = 100.0, 1e-4
 """Least state, and largest component of a tangent by the parameter, of a branch that grows.
 
 Next to a resonance that nothing limits, states grow beyond all bounds at one parameter.
@@ -409,7 +409,7 @@ def _end_of(curve: Curve, points: Sequence[CurvePoint]) -> str:
 def _grows(point: CurvePoint) -> bool:
     """Whether orbits grow beyond all others while the parameter hardly changes."""
     largest = float(np.max(np.abs(point.place[:-1])))
-    return largest > FARTHEST and abs(float(point.tangent[-1])) < UPRIGHT
+    return largest > FARTHEST and abs(float(point.tangent[-1])) < HARDLY_MOVES
 
 
 def _distances(step: float, many: int) -> Floats:

@@ -6,13 +6,14 @@ smoothly, and so do its multipliers.
 """
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, gaps_along
 from numpy.typing import NDArray
 
 from gearchaos.arrays import Floats
+from gearchaos.dynamics.arclength import OnCurve
 from gearchaos.dynamics.side_by_side import Search
 
 BEYOND = 1e-7, 1e-6, 1e-5, 1e-4
@@ -22,21 +23,7 @@ REACH = 10.0
 """Largest distance of this point from its prediction, relative to the distance."""
 
 
-class OfOrbit(Protocol):
-    """A point of a curve of orbits; ``place`` has their state, then the parameters.
-
-    ``section``: states of the orbit at the ends of the excitation periods, (periods, states).
-    """
-
-    @property
-    def place(self) -> Floats: ...
-    @property
-    def tangent(self) -> Floats: ...
-    @property
-    def section(self) -> Floats: ...
-
-
-Point = TypeVar("Point", bound=OfOrbit)
+Point = TypeVar("Point", bound=OnCurve)
 Asked = TypeVar("Asked")
 Answer = TypeVar("Answer")
 
@@ -78,13 +65,13 @@ def beyond_corner(
     number = states + int(np.argmax(np.abs(here.tangent[states:])))
     normal = np.zeros_like(here.place)
     normal[number] = np.sign(here.tangent[number]) or 1.0
-    beyond = None
+    before, beyond = flanks(here), None
     for distance in BEYOND:
         guess = here.place + distance * here.tangent
         if np.any((guess[states:] < 0.0) | (guess[states:] > 1.0)):
             break
         found = yield from correcting(guess, normal, REACH * distance)
-        if found is not None and np.any(flanks(found) != flanks(here)):
+        if found is not None and np.any(flanks(found) != before):
             if beyond is not None:
                 # Differences for the tangent of the first one may reach across the corner.
                 return found

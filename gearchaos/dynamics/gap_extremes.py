@@ -28,6 +28,11 @@ ALONG_STEP = np.linspace(0.0, 1.0, 9)
 """Shares of the way to an extreme at which gaps of other elements are looked at."""
 
 
+def fine_steps(steps: int) -> int:
+    """Return the least multiple of a number of steps per period that is `FINE` or more."""
+    return steps * -(-FINE // steps)
+
+
 class _Orbits(NamedTuple):
     """Orbits as their states at every step, and their gaps there."""
 

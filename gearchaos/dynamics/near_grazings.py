@@ -14,7 +14,7 @@ from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_tak
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint
-from gearchaos.dynamics.gap_extremes import FINE, about_extremes, nearest_extremes
+from gearchaos.dynamics.gap_extremes import FINE, about_extremes, fine_steps, nearest_extremes
 from gearchaos.dynamics.pairs_parting import nearly_zero
 
 TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
@@ -40,7 +40,7 @@ class _Orbits(NamedTuple):
         steps = steps_taken(system, curve.plan)
         if not curve.own_maps:
             # Between a few long steps, several extremes may lie.
-            steps *= -(-FINE // steps)
+            steps = fine_steps(steps)
         plan = curve.plan._replace(
             history_periods=curve.plan.recorded_periods, steps_per_period=steps
         )

@@ -286,6 +286,16 @@ def branches_page(
     return figure
 
 
+def _shown(branch: PeriodicBranch, longest: float) -> slice:
+    """Return the points of a branch that are drawn over its arclength; see `_draw_multipliers`."""
+    along = branch.arclength
+    if branch.ends[1] == GROWS:
+        return slice(int(np.searchsorted(along, longest, "right")))
+    if branch.ends[0] == GROWS:
+        return slice(int(np.searchsorted(along, along[-1] - longest)), None)
+    return slice(None)
+
+
 def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Artist]:
     """Draw the moduli of all multipliers over the arclength, one branch beside the other.
 
@@ -296,12 +306,9 @@ def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Ar
     offset, places, names = 0.0, [], []
     least = min(float(np.abs(one.multipliers).min()) for one in branches)
     for branch in branches:
-        far = (
-            branch.arclength if branch.ends[1] == GROWS else branch.arclength[-1] - branch.arclength
-        )
-        near = far <= longest if _grows(branch) else np.isfinite(far)
-        moduli = np.maximum(np.abs(branch.multipliers[near]), LEAST_MODULUS)
-        along = branch.arclength[near] - branch.arclength[near][0]
+        shown = _shown(branch, longest)
+        moduli = np.maximum(np.abs(branch.multipliers[shown]), LEAST_MODULUS)
+        along = branch.arclength[shown] - branch.arclength[shown][0]
         drawn += axes.plot(offset + along, moduli, color="black", linewidth=0.6)
         length = float(along[-1])
         places.append(offset + length / 2.0)

@@ -193,7 +193,6 @@ def test_the_range_of_a_parameter_ends_between_two_steps():
     tried["run"], tried["values"][:, 0] = -1.0, places
     tried["misfit"] = ((places - 0.5) / 0.3) ** 2
     found = reach(tried, rungs)
-
     assert found.alone[0, 1] - 0.5 == pytest.approx(0.3, rel=0.1)
     assert 0.5 - found.alone[0, 0] == pytest.approx(0.3, rel=0.1)
 
