@@ -2,7 +2,8 @@
 
 The table of a sweep has one row per lane and one column for each variable that has one number per
 lane. With --along section_point it has one row per section point. The table of a response has one
-row per instant; --along lane gives its lanes, and --spectrum its amplitude spectra.
+row per instant; --along lane gives its lanes, and --spectrum its amplitude spectra. In physical
+units, times and frequencies are those of the speed of each lane.
 
 CSV files give the units in brackets in the headings, [1] for pure numbers; Parquet files give them
 in the attributes that pandas reads.
@@ -17,6 +18,7 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.options import Option, Overwrite, Units
 
 if TYPE_CHECKING:
+    from gearchaos.arrays import Floats
     from gearchaos.results.reading.result import Result
 
 ENDINGS = (".csv", ".parquet", ".mat")
@@ -64,16 +66,12 @@ def _export(options: ExportOptions) -> None:
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.tables import needed
 
-    kind = options.output.lower().rpartition(".")[2]
-    if not options.output.lower().endswith(ENDINGS):
-        raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
-    if options.decimal != "." and kind != "csv":
-        raise ConfigurationError(f"--decimal {options.decimal}: is for .csv only; leave it out")
+    kind = _kind(options)
     result = open_result(options.result)
     over_time = is_response(result)
-    if options.spectrum and not (over_time and kind != "mat"):
-        rule = "writes a table of a response (.csv, .parquet), which python -m gearchaos.response"
-        raise ConfigurationError(f"--spectrum: {rule} computes; {options.result} has no motion")
+    if options.spectrum and not over_time:
+        rule = "writes a table of a response, which python -m gearchaos.response computes"
+        raise ConfigurationError(f"--spectrum: {rule}; {options.result} has no motion")
     result = in_units(result, options.units, over_time)
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
@@ -92,20 +90,43 @@ def _export(options: ExportOptions) -> None:
             rows, columns = frame.shape
             say(
                 f"{count_of(rows, 'row')} of {columns} columns and {_index(frame)}",
-                *_left(result, frame),
+                *_left(result, frame, options),
             )
     print(options.output, flush=True)
 
 
-def _left(result: "Result", frame: Any) -> list[str]:
-    """Return a line about the amplitudes that a table of lanes does not have, if there are any."""
+def _kind(options: ExportOptions) -> str:
+    """Return the ending of the file; raise ConfigurationError if options do not fit together."""
+    kind = options.output.lower().rpartition(".")[2]
+    if not options.output.lower().endswith(ENDINGS):
+        raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
+    if options.decimal != "." and kind != "csv":
+        raise ConfigurationError(f"--decimal {options.decimal}: is for .csv only; leave it out")
+    if options.spectrum and kind == "mat":
+        rule = "writes a table of a response; give a path that ends in .csv or .parquet"
+        raise ConfigurationError(f"--spectrum: {rule}")
+    if options.along and (options.spectrum or kind == "mat"):
+        rule = "a spectrum has one row per lane and frequency"
+        if kind == "mat":
+            rule = "a .mat file has all arrays with all their dimensions"
+        raise ConfigurationError(f"--along {options.along[0]}: {rule}; leave --along out")
+    return kind
+
+
+def _left(result: "Result", frame: Any, options: ExportOptions) -> list[str]:
+    """Return lines about amplitudes that a table of lanes lacks, and about states without units."""
     from gearchaos.outputs.names import ORDER
 
-    if ORDER not in result.variables or ORDER in frame.index.names:
-        return []
-    return [
-        f"without the amplitudes over {ORDER}, which have a table of their own: --along {ORDER}"
-    ]
+    lines = []
+    if ORDER in result.variables and ORDER not in frame.index.names:
+        lines.append(
+            f"without the amplitudes over {ORDER}, which have a table of their own: --along {ORDER}"
+        )
+    if "state" in options.along and options.units == "physical":
+        lines.append(
+            "states along state are dimensionless, since one column cannot have several units"
+        )
+    return lines
 
 
 def _index(frame: Any) -> str:
@@ -118,9 +139,28 @@ def _table(result: "Result", options: ExportOptions, over_time: bool) -> Any:
     from gearchaos.outputs.names import TIME
 
     if options.spectrum:
-        return _spectra(result)
+        return _spectra(result, _seconds_per_period(result, options))
     along = [name for name in options.along if name != "lane"]
-    return result.to_dataframe(*along or ([TIME] if over_time and not options.along else ()))
+    frame = result.to_dataframe(*along or ([TIME] if over_time and not options.along else ()))
+    seconds = _seconds_per_period(result, options)
+    if TIME in frame.index.names and frame.attrs["units"][TIME] == "1" and seconds is not None:
+        units = {**frame.attrs["units"], TIME: "s"}
+        frame = frame.reset_index(TIME)
+        frame[TIME] *= seconds.repeat(len(frame) // seconds.size)
+        frame = frame.set_index(TIME, append=bool(result.axes))
+        frame.attrs["units"] = units
+    return frame
+
+
+def _seconds_per_period(result: "Result", options: ExportOptions) -> "Floats | None":
+    """Return the mesh period of each lane in seconds, (lanes,), if the table is to have seconds."""
+    from gearchaos.outputs.names import MESH_PERIOD
+    from gearchaos.results.reading.physical_units import SECONDS
+
+    unit = result.variables[MESH_PERIOD].units if MESH_PERIOD in result else ""
+    if options.units == "dimensionless" or unit not in SECONDS:
+        return None
+    return SECONDS[unit] * result.lanes(MESH_PERIOD)
 
 
 def _headings(result: "Result", frame: Any) -> dict[str, str]:
@@ -132,27 +172,25 @@ def _headings(result: "Result", frame: Any) -> dict[str, str]:
     of_spectra = {f"amplitude_{name}": name for name in known}
     for name in words:
         variable = known.get(of_spectra.get(name) or name)
-        if variable is not None:
+        if variable is not None and variable.units == words[name]:
             words[name] = "" if variable.flags else unit_text(variable)
     return {name: f"{name} [{unit}]" for name, unit in words.items() if unit}
 
 
-def _spectra(result: "Result") -> Any:
-    """Return the single-sided amplitude spectra of all variables of a response over time."""
+def _spectra(result: "Result", seconds: "Floats | None") -> Any:
+    """Return the single-sided amplitude spectra of all variables of a response over time.
+
+    ``seconds``: mesh period of each lane, (lanes,); None gives frequencies as mesh orders.
+    """
     import numpy as np
 
-    from gearchaos.figures.response import (
-        response_variables_of,
-        seconds_per_period,
-        spectrum_of,
-    )
+    from gearchaos.figures.response import response_variables_of, spectrum_of
     from gearchaos.outputs.names import STATUS
     from gearchaos.progress import count_of, say
     from gearchaos.results.reading.tables import needed
 
     pandas, names = needed("pandas"), response_variables_of(result)
-    seconds = seconds_per_period(result)
-    frequency, unit = ("frequency", "Hz") if seconds > 0.0 else ("mesh_order", "1")
+    frequency, unit = ("mesh_order", "1") if seconds is None else ("frequency", "Hz")
     frames, windows = [], []
     for lane in np.flatnonzero(result.lanes(STATUS) == 0).tolist():
         found = {name: spectrum_of(result, lane, name) for name in names}
@@ -160,7 +198,7 @@ def _spectra(result: "Result") -> Any:
         windows.append(window)
         places = {axis: np.full(order.size, result.along(axis)[lane]) for axis in result.axes}
         columns = {f"amplitude_{name}": found[name][1] for name in names}
-        over = {frequency: order / seconds if seconds > 0.0 else order}
+        over = {frequency: order if seconds is None else order / seconds[lane]}
         frames.append(pandas.DataFrame({**places, **over, **columns}))
     if not frames:
         raise ConfigurationError("--spectrum: every lane of the response diverged")

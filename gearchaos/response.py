@@ -134,9 +134,14 @@ def _configuration(options: ResponseOptions) -> "Asked":
         folder = os.path.dirname(options.config) or "."
         return Configuration.from_toml(text, options.config, [*options.settings, *more], folder)
 
+    if not options.places:
+        parameter = configured().sweep.parameter
+        raise ConfigurationError(
+            f"--at: is missing; give one or more values of {parameter}, the swept parameter"
+        )
     names = {name or configured().sweep.parameter for name, _ in options.places}
-    if len(names) != 1:
-        rule = f"name one parameter, not {' and '.join(sorted(names)) or 'none'}"
+    if len(names) > 1:
+        rule = f"name one parameter, not {' and '.join(sorted(names))}"
         raise ConfigurationError(f"--at: {rule}; replace other keys with --set")
     # A repeated value is computed once.
     values = sorted({value for _, value in options.places})

@@ -23,6 +23,7 @@ SCALED = {
     "lyapunov_exponent_standard_error": " [per unit of tau]",
 }
 RESULT = result_over(AXES["two parameters, several starts"])
+SPEEDS = 4000.0, 8000.0
 
 
 @pytest.fixture
@@ -213,6 +214,48 @@ def test_spectra_are_exported_over_hertz(motion, capsys):
     np.testing.assert_allclose(lines, 2800.0 * order, rtol=1e-10)
     assert main([str(motion), str(motion.with_suffix(".mat")), "--spectrum"]) == 2
     assert "--spectrum: writes a table of a response" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def speeds(tmp_path_factory):
+    """Compute a response of the small pair at two speeds as a user does."""
+    folder = tmp_path_factory.mktemp("speeds")
+    small_config(folder)
+    given = [word for speed in SPEEDS for word in ("--at", f"operation.speed_rpm={speed:g}")]
+    ran = run_module(
+        "gearchaos.response", "gears.toml", *given, "--periods", "4", *LINEAR, cwd=folder
+    )
+    assert ran.code == 0, ran.err
+    return folder / "gears_response.h5"
+
+
+def of_speeds(table, name):
+    return [table[name][table.iloc[:, 0] == speed].to_numpy() for speed in SPEEDS]
+
+
+def test_each_speed_has_its_seconds_and_its_hertz(speeds, capsys):
+    result, mesh_hertz = open_result(speeds), 21 * np.array(SPEEDS)[:, np.newaxis] / 60.0
+    table, _ = exported(speeds, capsys)
+    times = of_speeds(table, "time [s]")
+    np.testing.assert_allclose(times, result["time"] / mesh_hertz, rtol=1e-12)
+    table, _ = exported(speeds, capsys, "--spectrum")
+    order, _, _ = spectrum_of(result, 0, "delta_5")
+    lines = of_speeds(table, "frequency [Hz]")
+    np.testing.assert_allclose(lines, order * mesh_hertz, rtol=1e-12)
+    table, _ = exported(speeds, capsys, "--units", "dimensionless")
+    assert table["time [1]"].max() == 4.0
+    table, _ = exported(speeds, capsys, "--spectrum", "--units", "dimensionless")
+    np.testing.assert_array_equal(of_speeds(table, "mesh_order [1]")[1], order)
+
+
+def test_options_that_do_nothing_are_refused(speeds, capsys):
+    for ending, option in ((".mat", []), (".csv", ["--spectrum"])):
+        target = speeds.with_suffix(ending)
+        assert main([str(speeds), str(target), "--along", "state", *option]) == 2
+        assert "--along state: " in capsys.readouterr().err
+        assert not target.exists()
+    _, said = exported(speeds, capsys, "--along", "state", "--units", "physical")
+    assert "states along state are dimensionless" in said
 
 
 def test_a_history_and_a_spectrum_are_drawn_in_ms_and_khz(motion):

@@ -257,7 +257,7 @@ def test_diverged_lanes_are_kept_and_reported(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "--at: name one parameter, not none"),
+        ([], "--at: is missing"),
         (["--at", "load=1", "--pitch-error", "1"], "not load and pitch_error"),
         (["--at", "5,86"], "'5,86' is not a finite number"),
         (["--at", "lode=1"], "did you mean `load`?"),

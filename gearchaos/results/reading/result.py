@@ -303,7 +303,7 @@ class Result:
         """Convert variables to physical units: um, m/s, m/s^2, N, s, 1/s and Hz.
 
         Pure numbers and `parameters` stay as they are. The time of a response is in seconds if all
-        lanes have the same mesh period, else in mesh periods.
+        lanes have the same mesh period, else in mesh periods: multiply it by ``mesh_period``.
 
         Parameters
         ----------
