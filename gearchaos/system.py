@@ -40,7 +40,7 @@ from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLos
 from gearchaos.engine.branching import arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
-from gearchaos.engine.method_choice import with_method
+from gearchaos.engine.method_choice import with_method, without_maps
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond, sampled_steps
 from gearchaos.engine.run_plan import plan_run
@@ -433,7 +433,9 @@ class System:
     def _traced(self, over: BranchRange, orbit: Orbit, share: float) -> PeriodicBranch:
         """Return the branch through an orbit at a share of the range."""
         point = checked_state("orbit.point", orbit.point, self.states)
-        curve = over.curve(self._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
+        own_maps = over.own_maps(self._plan.method)
+        follower = System(without_maps(self.config)) if own_maps else self
+        curve = over.curve(follower._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
         guess = np.append(point[0] / curve.scale, share)
         start = curve.corrected(guess, along_the_way(guess.size - 1))
         if start is None:
@@ -441,7 +443,7 @@ class System:
                 f"{self.config.source}: the orbit is none of this system; find it with "
                 "System.orbit of the same system"
             )
-        return arrays_of_branch(over, trace(curve, start), plan_run(self.config))
+        return arrays_of_branch(over, trace(curve, start), plan_run(follower.config))
 
     def orbits(self, period: int, record: int = CLOSE_RETURN_RECORD) -> list[Orbit]:
         """Find the periodic orbits that the motion comes near, also unstable ones within chaos.

@@ -23,7 +23,7 @@ from gearchaos.dynamics.boundary_following import (
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_specials import ROUNDING_OF_TESTS
-from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
+from gearchaos.dynamics.pairs_parting import joined_with, partings
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CUSP,
@@ -285,18 +285,12 @@ def _with_pairs_parted(
         guess = cubic(one, other, np.array([share]))[0]
         return _found_between(equations, (one, other), guess, direction)
 
-    sought = [
-        (at, name)
-        for name in TESTS[equations.kind]
-        for at in nearly_zero(points, np.array([one[name] for one in tests]))
-    ]
-    found = yield from together(
-        [
-            parting(points[at - 1 : at + 2], partial(_test, equations.kind, name), between)
-            for at, name in sought
-        ]
-    )
-    return joined_with(points, [(at, one) for (at, _), one in zip(sought, found, strict=True)])
+    searches = []
+    for name in TESTS[equations.kind]:
+        test, values = partial(_test, equations.kind, name), np.array([one[name] for one in tests])
+        searches += partings(points, values, test, between)
+    found = yield from together([search for _, search in searches])
+    return joined_with(points, [*zip((at for at, _ in searches), found, strict=True)])
 
 
 def _cut(

@@ -23,7 +23,7 @@ from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, cubic, is_exact
 from gearchaos.dynamics.curve_defects import Finding
 from gearchaos.dynamics.near_grazings import TestFunction, near_grazings
-from gearchaos.dynamics.pairs_parting import joined_with, nearly_zero, parting
+from gearchaos.dynamics.pairs_parting import joined_with, parting, partings
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -65,20 +65,26 @@ MOST_TRIALS = 80
 def with_pairs_parted(curve: Curve, points: list[CurvePoint]) -> Finding[list[CurvePoint]]:
     """Search points that part pairs of special points of one kind; return all points in order."""
     grazings = near_grazings(curve, points)
-    sought = [*_multipliers_near_zero(points), *grazings.tests]
 
     def between(one: CurvePoint, other: CurvePoint, share: float) -> Finding[CurvePoint | None]:
         return _between(curve, one, other, share)
 
-    searches = [parting(points[at - 1 : at + 2], test, between) for at, test in sought]
-    searches += [between(points[at], points[at + 1], share) for at, share in grazings.between]
-    found = yield from together(searches)
-    beside = [at for at, _ in (*sought, *grazings.between)]
+    searches = [
+        one
+        for test, values in _of_multipliers_along(points)
+        for one in partings(points, values, test, between)
+    ]
+    searches += [
+        (at, parting(points[at - 1 : at + 2], (0, 2), test, between)) for at, test in grazings.tests
+    ]
+    searches += [(at, between(points[at], points[at + 1], share)) for at, share in grazings.between]
+    found = yield from together([search for _, search in searches])
+    beside = [at for at, _ in searches]
     return joined_with(points, [*zip(beside, found, strict=True)])
 
 
-def _multipliers_near_zero(points: Sequence[CurvePoint]) -> Iterator[tuple[int, TestFunction]]:
-    """Yield the points near which a test function of the multipliers comes near to zero."""
+def _of_multipliers_along(points: Sequence[CurvePoint]) -> Iterator[tuple[TestFunction, Floats]]:
+    """Yield the test functions of the multipliers, and their values at some points, (points,)."""
     functions = [_test_functions(one) for one in points]
     values = np.array([[*one.values()] for one in functions])
     for kind, of_kind in zip(functions[0], values.T, strict=True):
@@ -86,8 +92,7 @@ def _multipliers_near_zero(points: Sequence[CurvePoint]) -> Iterator[tuple[int, 
         def test(some: Sequence[CurvePoint], kind: str = kind) -> Floats:
             return np.array([_test_functions(one)[kind] for one in some])
 
-        for at in nearly_zero(points, of_kind):
-            yield at, test
+        yield test, of_kind
 
 
 def _test_functions(point: CurvePoint) -> dict[str, float]:

@@ -24,6 +24,18 @@ FINE = 48
 FINER, FINEST = 8, 3
 """Factor by which steps are shortened where a contact changes before an extreme, and how often."""
 
+CUBIC, SMOOTH = 1e-2, 2000
+"""Error of the cubic through both ends of one of `FINE` steps, relative to the largest gap.
+
+It falls with the fourth power of the length of a step, up to as many steps as the second number.
+"""
+
+NEAR = 10.0
+"""Largest distance of an extreme from a flank at which this error matters, relative to it."""
+
+MOST_NUMBERS = 4_000_000
+"""Largest number of values in the histories of some orbits."""
+
 ALONG_STEP = np.linspace(0.0, 1.0, 9)
 """Shares of the way to an extreme at which gaps of other elements are looked at."""
 
@@ -56,6 +68,21 @@ class _Orbits(NamedTuple):
         plan = self.plan._replace(steps_per_period=FINER * self.plan.steps_per_period)
         system = self.system.of(lanes)
         return self.of(system, plan, integrate(system, self.history[lanes, 0], plan).history)
+
+    def blurred(self, samples: Integers, element: int, at: Floats, beyond: Floats) -> Mask:
+        """Whether the polynomials of steps (lanes,) are too far from the motion up to some places.
+
+        ``at``: the places, from -1 to 1; ``beyond``: how far they lie beyond a flank, (lanes,).
+        """
+        method = METHODS[self.plan.method]
+        if method.gap_terms is not None:
+            # They hold until another element changes its contact.
+            return self.others_change(samples, element, at)
+        # RK4 itself takes the cubic through both ends; the motion of series is another curve.
+        steps = self.plan.steps_per_period
+        error = CUBIC * (FINE / steps) ** 4 if method.always_resolved and steps < SMOOTH else 0.0
+        largest = np.max(np.abs(self.gaps.value[:, :, element]), axis=1)
+        return np.asarray(np.abs(beyond) < NEAR * error * largest)
 
     def others_change(self, samples: Integers, element: int, at: Floats) -> Mask:
         """Whether another element changes its contact within steps (lanes,) before places in them.
@@ -90,8 +117,8 @@ def _nearest(
 ) -> tuple[Floats, Floats]:
     """Return the extremes of `nearest_extremes`.
 
-    The exact polynomial of a step holds until another element changes its contact. Where it does so
-    before the extreme, the orbit is integrated with shorter steps, ``levels`` times at most.
+    Where the polynomial of the step with the extreme is not exact, the orbit is integrated with
+    shorter steps, ``levels`` times at most.
     """
     gaps, element = orbits.gaps, int(flanks[0]) // 2
     beyond = about_extremes(gaps, flanks)
@@ -107,12 +134,13 @@ def _nearest(
     at = _turning(terms, at)
     beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - _place_of(gaps, flanks)
     there, found = turns.any(axis=1), samples + 0.5 * (at + 1.0)
-    if levels and METHODS[orbits.plan.method].gap_terms is not None:
-        (late,) = np.nonzero(there & orbits.others_change(samples, element, at))
-        if late.size:
-            wanted = FINER * phases[late]
-            again = _nearest(orbits.finer(late), flanks[late], wanted, levels - 1)
-            beyond[late], found[late] = again[0], again[1] / FINER
+    if levels:
+        (late,) = np.nonzero(there & orbits.blurred(samples, element, at, beyond))
+        many = max(MOST_NUMBERS // (FINER * orbits.history[0].size), 1)
+        for first in range(0, late.size, many):
+            some = late[first : first + many]
+            again = _nearest(orbits.finer(some), flanks[some], FINER * phases[some], levels - 1)
+            beyond[some], found[some] = again[0], again[1] / FINER
     return np.where(there, beyond, np.nan), found
 
 

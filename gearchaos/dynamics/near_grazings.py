@@ -14,14 +14,17 @@ from gearchaos_kernels import LaneSystem, Plan, gaps_along, integrate, steps_tak
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve, CurvePoint
-from gearchaos.dynamics.gap_extremes import FINE, about_extremes, fine_steps, nearest_extremes
+from gearchaos.dynamics.gap_extremes import (
+    FINE,
+    MOST_NUMBERS,
+    about_extremes,
+    fine_steps,
+    nearest_extremes,
+)
 from gearchaos.dynamics.pairs_parting import nearly_zero
 
 TestFunction: TypeAlias = Callable[[Sequence[CurvePoint]], Floats]
 """Returns values at some points of a curve, (points,), that are zero at special points."""
-
-MOST_NUMBERS = 4_000_000
-"""Largest number of values in the histories of some orbits."""
 
 
 class _Orbits(NamedTuple):

@@ -1,15 +1,16 @@
 """Points of a curve that part two special points of one kind.
 
 Two special points between the same two points change the sign of their test function twice. Where
-a test function comes near to zero, a point of the curve is therefore searched between them.
+a test function comes near to zero, a point of the curve is therefore searched between them. It does
+so at a point with the least value among three, or between two points if it heads for zero.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from gearchaos.arrays import Floats
+from gearchaos.arrays import Floats, Mask
 from gearchaos.dynamics.arclength import OnCurve
 from gearchaos.dynamics.side_by_side import Search
 
@@ -19,6 +20,12 @@ NEAR_ZERO = 0.5
 Where the extreme is larger, there are no two special points to part.
 """
 
+SHORT_STRETCH = 1e-5
+"""Length of a stretch in which no two special points are told apart, since they nearly coincide."""
+
+SAME_PLACE = 1e-9
+"""Distance below which two points that were found are one."""
+
 MOST_PARTINGS = 8
 """Largest number of points with which a point between two special points is searched."""
 
@@ -27,70 +34,160 @@ Asked = TypeVar("Asked")
 Answered = TypeVar("Answered")
 
 
+class _Expected(NamedTuple):
+    """Where a test function is expected to come near to zero between two points of a curve.
+
+    ``stretch``: number of the point with which the stretch between both begins; ``share``: share of
+    the way to the next point; ``extreme``: expected value, positive if it has the sign of both.
+    """
+
+    stretch: int
+    share: float
+    extreme: float
+
+
 def nearly_zero(points: Sequence[OnCurve], values: Floats) -> list[int]:
     """Return the points near which a test function may be zero without a change of its sign.
 
     ``values``: those of all points, (points,). There its amount is the least among three points,
     and the parabola through them comes near to zero.
     """
-    size = np.abs(values)
+    near, _, _ = _among_three(values, _lengths(points))
+    return (np.flatnonzero(near) + 1).tolist()
+
+
+def partings(
+    points: Sequence[Point],
+    values: Floats,
+    test: Callable[[Sequence[Point]], Floats],
+    between: Callable[[Point, Point, float], Search[Asked, Answered, Point | None]],
+) -> list[tuple[int, Search[Asked, Answered, Point | None]]]:
+    """Return the searches of points that part two zeros of a test function, for `joined_with`.
+
+    ``values``: those of the function at all points, (points,); others as in `parting`. Each search
+    comes with the number of the point beside which its result lies.
+    """
+    found, beside = [], set[int]()
+    for at in nearly_zero(points, values):
+        first = max(at - 2, 0)
+        within = at - 1 - first, at + 1 - first
+        found.append((at, parting(points[first : at + 3], within, test, between)))
+        beside |= {at - 1, at}
+    headed = {one.stretch for one in _headed_both_ways(values, _lengths(points))}
+    for at in sorted(headed - beside):
+        first = max(at - 1, 0)
+        within = at - first, at + 1 - first
+        found.append((at, parting(points[first : at + 3], within, test, between)))
+    return found
+
+
+def _lengths(points: Sequence[OnCurve]) -> Floats:
+    """Return the distances of successive points, (points - 1,)."""
+    places = np.array([one.place for one in points])
+    return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=1))
+
+
+def _among_three(values: Floats, lengths: Floats) -> tuple[Mask, Floats, Floats]:
+    """Return where the parabola through three values comes near to zero, (points - 2,) each.
+
+    Returned are whether it does so, its distance from the second point, and its extreme, which is
+    positive if it has the sign of the values. The second value has the least amount of the three.
+    """
+    size, sign = np.abs(values), np.sign(values[1:-1])
     same = (values[:-2] * values[1:-1] > 0.0) & (values[1:-1] * values[2:] > 0.0)
     least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+    before, after = lengths[:-1], lengths[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.diff(size) / lengths
+        bend = (slopes[1:] - slopes[:-1]) / (before + after)
+        slope = (slopes[:-1] * after + slopes[1:] * before) / (before + after)
+        away = -slope / (2.0 * bend)
+        extreme = size[1:-1] - slope**2 / (4.0 * bend)
+        near = same & least & (bend > 0.0) & (sign != 0.0) & (away != 0.0)
+        near &= (-before < away) & (away < after) & (extreme <= NEAR_ZERO * size[1:-1])
+    return near, away, extreme
+
+
+def _headed_both_ways(values: Floats, lengths: Floats) -> list[_Expected]:
+    """Return where values head for zero, seen from both ends of the curve."""
+    last = lengths.size - 1
+    backwards = _headed(values[::-1], lengths[::-1])
     return [
-        at
-        for at in (np.nonzero(same & least)[0] + 1).tolist()
-        if extreme_near_zero(points[at - 1 : at + 2], values[at - 1 : at + 2]) is not None
+        *_headed(values, lengths),
+        *(_Expected(last - one.stretch, 1.0 - one.share, one.extreme) for one in backwards),
     ]
 
 
-def extreme_near_zero(three: Sequence[OnCurve], values: Floats) -> float | None:
-    """Return where the parabola through three values (3,) comes near to zero.
+def _headed(values: Floats, lengths: Floats) -> list[_Expected]:
+    """Return where values head for zero with the slope of the stretch before.
 
-    The result is the distance from the second point. None if it does not come near to zero between
-    the points.
+    Next to a grazing a test function may turn within a stretch, like the root of the distance: none
+    of the points then has the least value. The parabola through both ends of a stretch has the
+    slope with which the values arrive there.
     """
-    before, after = (float(np.linalg.norm(one.place - three[1].place)) for one in three[::2])
-    sign = np.sign(values[1])
-    bend, slope, height = np.polyfit(np.array([-before, 0.0, after]), sign * values, 2)
-    if not bend > 0.0:
-        return None
-    at, extreme = -slope / (2.0 * bend), height - slope**2 / (4.0 * bend)
-    if not -before < at < after or extreme > NEAR_ZERO * abs(values[1]):
-        return None
-    return float(at)
+    begin, end, length = values[1:-1], values[2:], lengths[1:]
+    sign = np.sign(begin)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = (begin - values[:-2]) / lengths[:-1] * length
+        share = 0.5 * slope / (slope - (end - begin))
+        extreme = sign * (begin + 0.5 * slope * share)
+        near = (begin * end > 0.0) & (begin * slope < 0.0) & (share > 0.0) & (share < 1.0)
+        near &= (length > SHORT_STRETCH) & (extreme <= NEAR_ZERO * np.abs(begin))
+    return [
+        _Expected(at + 1, float(share[at]), float(extreme[at]))
+        for at in np.flatnonzero(near).tolist()
+    ]
+
+
+def _expected(points: Sequence[OnCurve], values: Floats) -> list[_Expected]:
+    """Return all places where a test function is expected to come near to zero."""
+    lengths = _lengths(points)
+    near, away, extreme = _among_three(values, lengths)
+    found = _headed_both_ways(values, lengths)
+    for at in np.flatnonzero(near).tolist():
+        back = away[at] < 0.0
+        share = 1.0 + away[at] / lengths[at] if back else away[at] / lengths[at + 1]
+        found.append(_Expected(at + (not back), float(share), float(extreme[at])))
+    return found
 
 
 def parting(
-    three: Sequence[Point],
+    points: Sequence[Point],
+    within: tuple[int, int],
     test: Callable[[Sequence[Point]], Floats],
     between: Callable[[Point, Point, float], Search[Asked, Answered, Point | None]],
 ) -> Search[Asked, Answered, Point | None]:
-    """Search a point among three at which a test function has another sign than at them.
+    """Search a point of a curve at which a test function has another sign than at its neighbours.
 
-    Each step takes the extreme of the parabola through the three points nearest to it.
+    Each step takes the place where the function is expected to come nearest to zero.
 
-    ``test`` returns the function at some points, (points,); ``between`` searches the point of the
-    curve at a share of the way between two points.
+    Parameters
+    ----------
+    points : sequence of Point
+        Points of the curve, in order.
+    within : (int, int)
+        Numbers of the points between which the point is searched. Those beside them show how the
+        values arrive there.
+    test : callable
+        Returns the function at some points, (points,).
+    between : callable
+        Searches the point of the curve at a share of the way between two points.
     """
+    some, values = list(points), test(points)
+    first, last = within
     for _ in range(MOST_PARTINGS):
-        values = test(three)
-        at = extreme_near_zero(three, values)
-        if at is None or at == 0.0:
+        expected = [one for one in _expected(some, values) if first <= one.stretch < last]
+        if not expected:
             return None
-        before = at < 0.0
-        one, other = three[:2] if before else three[1:]
-        length = float(np.linalg.norm(other.place - one.place))
-        share = (at + length if before else at) / length
-        new = yield from between(one, other, min(max(share, 1e-3), 1.0 - 1e-3))
+        at, share, _ = min(expected, key=lambda one: one.extreme)
+        new = yield from between(some[at], some[at + 1], min(max(share, 1e-3), 1.0 - 1e-3))
         if new is None:
             return None
-        value = float(test([new])[0])
-        if value * values[1] <= 0.0:
+        (value,) = test([new])
+        if value * values[at] <= 0.0:
             return new
-        if abs(value) > abs(values[1]):
-            three = [new, *three[1:]] if before else [*three[:2], new]
-        else:
-            three = [one, new, other]
+        some.insert(at + 1, new)
+        values, last = np.insert(values, at + 1, value), last + 1
     return None
 
 
@@ -107,7 +204,9 @@ def joined_with(points: list[Point], found: Sequence[tuple[int, Point | None]]) 
     joined = list(points)
     # The last ones first: the numbers of those before stay.
     for first, _, one in sorted(parted, key=lambda it: it[:2], reverse=True):
-        joined.insert(first + 1, one)
+        # Two searches may have found the same point.
+        if np.linalg.norm(joined[first + 1].place - one.place) > SAME_PLACE:
+            joined.insert(first + 1, one)
     return joined
 
 

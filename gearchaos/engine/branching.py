@@ -8,6 +8,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Floats, Integers
+from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branch_specials import LOCATED
@@ -21,6 +22,7 @@ from gearchaos.dynamics.branches import (
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
+from gearchaos.engine.method_choice import without_maps
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -117,10 +119,26 @@ def find_branches(
         return system_of(config, {parameter: at}, config.needed_effects)
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
-    search = BranchSearch(over, plan_run(config), longest)
+    search = BranchSearch(over, _planned(config, over), longest)
     with one_thread():
         search.follow(search.motions(result, swept[0]))
         return _described(search, result.variables[swept[0]])
+
+
+def _planned(config: Configuration, over: BranchRange) -> RunPlan:
+    """Return the run of a configuration with the method that follows branches."""
+    planned = plan_run(config)
+    given = planned.plan.method
+    if not over.own_maps(given):
+        return planned
+    other = plan_run(without_maps(config))
+    taken = other.plan.method
+    if taken != given:
+        say(
+            f"branches are followed with {METHODS[taken].title}, since every value of "
+            f"{config.sweep.parameter} would have {METHODS[given].title} of its own"
+        )
+    return other
 
 
 class BranchSearch:

@@ -112,8 +112,9 @@ class TrainConfiguration(MachineConfiguration):
     def frequency_at(self, values: Mapping[str, float]) -> float:
         """Return the angular frequency of the excitation in rad/ms."""
         speed = values.get(self.rate, self.operation.speed_rpm)
-        return 2.0 * math.pi * self.common_rate() * speed / 60.0 * 1e-3
+        return 2.0 * math.pi * self.common_rate * speed / 60.0 * 1e-3
 
+    @cached_property
     def common_rate(self) -> float:
         """Return the common periods of all meshes in a turn of the input member."""
         if self.planetary is not None:

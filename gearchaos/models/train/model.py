@@ -72,4 +72,4 @@ class TrainModel(MachineModel):
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:
         """Return the scales of frequency, and of speed: that of the common period of all meshes."""
         lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-        return Scales(np.full(lanes, 1e3), 60.0 / config.common_rate())
+        return Scales(np.full(lanes, 1e3), 60.0 / config.common_rate)
