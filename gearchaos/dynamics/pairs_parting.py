@@ -21,13 +21,16 @@ Where the extreme is larger, there are no two special points to part.
 """
 
 SHORT_STRETCH = 1e-5
-"""Length of a stretch in which no two special points are told apart, since they nearly coincide."""
+"""Length of a stretch in which two special points count as one."""
 
 SAME_PLACE = 1e-9
 """Distance below which two points that were found are one."""
 
-MOST_PARTINGS = 8
-"""Largest number of points with which a point between two special points is searched."""
+MOST_PARTINGS, MISSES, PROGRESS = 8, 1, 0.75
+"""Largest number of points with which a point between two special points is searched.
+
+That many of them may have a value above this share of the least one before.
+"""
 
 Point = TypeVar("Point", bound=OnCurve)
 Asked = TypeVar("Asked")
@@ -139,16 +142,23 @@ def _headed(values: Floats, lengths: Floats) -> list[_Expected]:
     ]
 
 
-def _expected(points: Sequence[OnCurve], values: Floats) -> list[_Expected]:
-    """Return all places where a test function is expected to come near to zero."""
+def _expected(points: Sequence[OnCurve], values: Floats, stretches: range) -> _Expected | None:
+    """Return where a test function is expected to come nearest to zero within some stretches.
+
+    A least value among three points says more than a slope from one side.
+    """
     lengths = _lengths(points)
     near, away, extreme = _among_three(values, lengths)
-    found = _headed_both_ways(values, lengths)
+    found = []
     for at in np.flatnonzero(near).tolist():
         back = away[at] < 0.0
         share = 1.0 + away[at] / lengths[at] if back else away[at] / lengths[at + 1]
         found.append(_Expected(at + (not back), float(share), float(extreme[at])))
-    return found
+    for some in (found, _headed_both_ways(values, lengths)):
+        within = [one for one in some if one.stretch in stretches]
+        if within:
+            return min(within, key=lambda one: one.extreme)
+    return None
 
 
 def parting(
@@ -175,17 +185,21 @@ def parting(
     """
     some, values = list(points), test(points)
     first, last = within
+    misses = 0
     for _ in range(MOST_PARTINGS):
-        expected = [one for one in _expected(some, values) if first <= one.stretch < last]
-        if not expected:
+        expected = _expected(some, values, range(first, last))
+        if expected is None:
             return None
-        at, share, _ = min(expected, key=lambda one: one.extreme)
+        at, share, _ = expected
         new = yield from between(some[at], some[at + 1], min(max(share, 1e-3), 1.0 - 1e-3))
         if new is None:
             return None
         (value,) = test([new])
         if value * values[at] <= 0.0:
             return new
+        misses += abs(value) > PROGRESS * np.min(np.abs(values[first : last + 1]))
+        if misses > MISSES:
+            return None
         some.insert(at + 1, new)
         values, last = np.insert(values, at + 1, value), last + 1
     return None

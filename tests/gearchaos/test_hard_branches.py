@@ -269,3 +269,26 @@ def test_a_branch_ends_where_its_orbits_grow_without_bound():
     amplitude = branch.section[-1, 0, 0]
     assert 100.0 < amplitude / small < 110.0
     assert amplitude == pytest.approx(1.0 / (1.0 - branch.value[-1] ** 2), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("swept", "low", "high", "method"),
+    [
+        ("frequency", 0.9, 1.1, "taylor"),
+        ("clearance.stop.half_clearance", 0.9, 1.1, "flow_map"),
+    ],
+)
+def test_maps_are_used_where_the_values_of_a_parameter_share_them(swept, low, high, method):
+    text = MASS.format(**BASE, swept=swept, low=low, high=high)
+    text = text.replace('method = "taylor"', 'method = "flow_map"')
+    config = gearchaos.Configuration.from_toml(text, "mass.toml")
+    found = find_branches(gearchaos.run(config), longest=1)
+    assert found.metadata["method"] == method
+    series = branches(1, swept, low, high)
+    assert len(found.branches) == len(series) > 0
+    for one, other in zip(found.branches, series, strict=True):
+        assert one.ends == other.ends
+        kinds = [[special.kind for special in branch.specials] for branch in (one, other)]
+        values = [[special.value for special in branch.specials] for branch in (one, other)]
+        assert kinds[0] == kinds[1]
+        assert values[0] == pytest.approx(values[1], abs=1e-9)
