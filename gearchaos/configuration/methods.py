@@ -31,8 +31,6 @@ class Method:
         Largest number of clearance elements of a machine of any number of coordinates; None: any.
     for_machines : bool
         Whether it integrates machines only: matrices, trains and planetary sets, no gear pairs.
-    knows_gaps : bool
-        Whether the gap along a step is one polynomial, as continuations of grazing points need.
     """
 
     name: str
@@ -44,7 +42,6 @@ class Method:
     shares_maps: bool = False
     most_elements: int | None = None
     for_machines: bool = False
-    knows_gaps: bool = True
 
     def description(self, steps: int, crossings: str) -> str:
         """Return the method with its settings in words, for the dry run and the metadata.
@@ -81,7 +78,6 @@ INTEGRATORS = (
         always_resolved=True,
         most_elements=52,
         for_machines=True,
-        knows_gaps=False,
     ),
 )
 """The methods that integrate lanes."""

@@ -24,15 +24,6 @@ FINE = 48
 FINER, FINEST = 8, 3
 """Factor by which steps are shortened where a contact changes before an extreme, and how often."""
 
-CUBIC, SMOOTH = 1e-2, 2000
-"""Error of the cubic through both ends of one of `FINE` steps, relative to the largest gap.
-
-It falls with the fourth power of the length of a step, up to as many steps as the second number.
-"""
-
-NEAR = 10.0
-"""Largest distance of an extreme from a flank at which this error matters, relative to it."""
-
 MOST_NUMBERS = 4_000_000
 """Largest number of values in the histories of some orbits."""
 
@@ -69,21 +60,6 @@ class _Orbits(NamedTuple):
         system = self.system.of(lanes)
         return self.of(system, plan, integrate(system, self.history[lanes, 0], plan).history)
 
-    def blurred(self, samples: Integers, element: int, at: Floats, beyond: Floats) -> Mask:
-        """Whether the polynomials of steps (lanes,) are too far from the motion up to some places.
-
-        ``at``: the places, from -1 to 1; ``beyond``: how far they lie beyond a flank, (lanes,).
-        """
-        method = METHODS[self.plan.method]
-        if method.gap_terms is not None:
-            # They hold until another element changes its contact.
-            return self.others_change(samples, element, at)
-        # RK4 itself takes the cubic through both ends; the motion of series is another curve.
-        steps = self.plan.steps_per_period
-        error = CUBIC * (FINE / steps) ** 4 if method.always_resolved and steps < SMOOTH else 0.0
-        largest = np.max(np.abs(self.gaps.value[:, :, element]), axis=1)
-        return np.asarray(np.abs(beyond) < NEAR * error * largest)
-
     def others_change(self, samples: Integers, element: int, at: Floats) -> Mask:
         """Whether another element changes its contact within steps (lanes,) before places in them.
 
@@ -117,8 +93,8 @@ def _nearest(
 ) -> tuple[Floats, Floats]:
     """Return the extremes of `nearest_extremes`.
 
-    Where the polynomial of the step with the extreme is not exact, the orbit is integrated with
-    shorter steps, ``levels`` times at most.
+    The exact polynomial of a step holds until another element changes its contact. Where it does so
+    before the extreme, the orbit is integrated with shorter steps, ``levels`` times at most.
     """
     gaps, element = orbits.gaps, int(flanks[0]) // 2
     beyond = about_extremes(gaps, flanks)
@@ -134,8 +110,12 @@ def _nearest(
     at = _turning(terms, at)
     beyond = np.polynomial.polynomial.polyval(at, terms.T, tensor=False) - _place_of(gaps, flanks)
     there, found = turns.any(axis=1), samples + 0.5 * (at + 1.0)
+    # Series are NaN where a step is longer than they reach. RK4 itself looks at the cubic only.
+    ends = np.isnan(beyond)
+    if METHODS[orbits.plan.method].gap_terms is not None:
+        ends |= orbits.others_change(samples, element, at)
     if levels:
-        (late,) = np.nonzero(there & orbits.blurred(samples, element, at, beyond))
+        (late,) = np.nonzero(there & ends)
         many = max(MOST_NUMBERS // (FINER * orbits.history[0].size), 1)
         for first in range(0, late.size, many):
             some = late[first : first + many]

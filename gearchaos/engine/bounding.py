@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import METHODS, steps_taken
+from gearchaos_kernels import steps_taken
 
 from gearchaos.arrays import Complex, Floats, Integers, Mask
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way, repeats_sooner
@@ -18,14 +18,18 @@ from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import Found, run, together
-from gearchaos.engine.branching import BranchSearch, flank_name, require_range
+from gearchaos.engine.branching import (
+    BranchSearch,
+    flank_name,
+    require_range,
+    run_of_continuation,
+)
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.map_changes import DOUBLES, JUMP, Changes, MapChange, changes_of
 from gearchaos.engine.map_lines import Line, Ranges
-from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
-from gearchaos.engine.run_plan import RunPlan, plan_run
+from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.running import one_thread
 from gearchaos.engine.running import run as compute
 from gearchaos.errors import ConfigurationError
@@ -134,9 +138,10 @@ def find_boundaries(
         )
     require_range(config, name)
     over = Ranges.of(config)
-    search = _BoundarySearch(
-        over, plan_run(for_continuation(_small(config, PARAMETERS))), longest, result
+    run_of_search = run_of_continuation(
+        _small(config, PARAMETERS), lambda method: any(over.maps_depend(method))
     )
+    search = _BoundarySearch(over, run_of_search, longest, result)
     places = search.lines(lines)
     with one_thread(), progress(len(places), unit="lines") as bar:
         try:
@@ -508,13 +513,8 @@ class _BoundarySearch:
     @cached_property
     def fixed(self) -> int:
         """The only parameter on which flow maps depend, -1 if they depend on both or on none."""
-        sharing = METHODS[self.run.plan.method].sharing
-        depends = []
-        for number in range(PARAMETERS):
-            shares = np.full((2, PARAMETERS), 0.5)
-            shares[1, number] = 0.75
-            depends.append(np.unique(sharing(self.over.system_at(shares))).size > 1)
-        return depends.index(True) if sum(depends) == 1 else -1
+        depend = self.over.maps_depend(self.run.plan.method)
+        return depend.index(True) if sum(depend) == 1 else -1
 
     @cached_property
     def interpolated(self) -> int:

@@ -1,6 +1,6 @@
 """The branches of a sweep: the curves of the periodic orbits it found, and their doublings."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -119,24 +119,27 @@ def find_branches(
         return system_of(config, {parameter: at}, config.needed_effects)
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
-    search = BranchSearch(over, _planned(config, over), longest)
+    search = BranchSearch(over, run_of_continuation(config, over.own_maps), longest)
     with one_thread():
         search.follow(search.motions(result, swept[0]))
         return _described(search, result.variables[swept[0]])
 
 
-def _planned(config: Configuration, over: BranchRange) -> RunPlan:
-    """Return the run of a configuration with the method that follows branches."""
+def run_of_continuation(config: Configuration, own_maps: Callable[[str], bool]) -> RunPlan:
+    """Return the run of a configuration with the method that follows orbits over its sweeps.
+
+    ``own_maps``: whether every value of a swept parameter has maps of its own, by the method.
+    """
     planned = plan_run(config)
     given = planned.plan.method
-    if not over.own_maps(given):
+    if not own_maps(given):
         return planned
     other = plan_run(without_maps(config))
     taken = other.plan.method
     if taken != given:
         say(
-            f"branches are followed with {METHODS[taken].title}, since every value of "
-            f"{config.sweep.parameter} would have {METHODS[given].title} of its own"
+            f"orbits are followed with {METHODS[taken].title}, since each would need "
+            f"{METHODS[given].title} of its own"
         )
     return other
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import LaneSystem
+from gearchaos_kernels import METHODS, LaneSystem
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.boundary_passages import PARAMETERS
@@ -48,6 +48,15 @@ class Ranges(NamedTuple):
         """Return the systems of lanes at shares of both ranges, (lanes, 2)."""
         columns = dict(zip(self.parameters, self.values(shares).T, strict=True))
         return system_of(self.config, columns, self.config.needed_effects)
+
+    def maps_depend(self, method: str) -> tuple[bool, ...]:
+        """Return of each parameter whether the maps of a method depend on it."""
+        depend = []
+        for number in range(PARAMETERS):
+            shares = np.full((2, PARAMETERS), 0.5)
+            shares[1, number] = 0.75
+            depend.append(np.unique(METHODS[method].sharing(self.system_at(shares))).size > 1)
+        return tuple(depend)
 
     def line(self, line: Line, number: int, lines: Sequence[Line]) -> BranchRange:
         """Return the range along a line, which has a number among others."""

@@ -6,7 +6,7 @@ import numpy as np
 from gearchaos_kernels import METHODS
 
 from gearchaos.configuration import methods
-from gearchaos.configuration.methods import AUTO, DEFAULT, EXACT, INTEGRATORS
+from gearchaos.configuration.methods import AUTO, DEFAULT, INTEGRATORS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
@@ -113,34 +113,10 @@ def with_method(config: Configuration) -> tuple[Configuration, str]:
     return possible[chosen], note
 
 
-def for_continuation(config: Configuration) -> Configuration:
-    """Return a configuration whose method knows gaps along whole steps.
-
-    Parameters
-    ----------
-    config : Configuration
-        The configuration.
-
-    Returns
-    -------
-    Configuration
-        The same, or the configuration with flow maps if its method takes steps in pieces.
-
-    Raises
-    ------
-    ConfigurationError
-        If no method can integrate it.
-    """
-    chosen, _ = with_method(config)
-    if methods.METHODS[chosen.integration.method].knows_gaps:
-        return config
-    return chosen.integrated_by(EXACT.name)
-
-
 def without_maps(config: Configuration) -> Configuration:
     """Return a configuration with an exact method that makes no maps, if there is one.
 
-    Where every value of a parameter would have flow maps of its own, branches then take less time.
+    Where every value of a parameter would have flow maps of its own, continuation takes less time.
     Next to grazings they are more exact: neighbouring maps differ in their rounding, which a
     difference over a small step of the parameter magnifies.
 

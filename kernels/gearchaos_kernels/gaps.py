@@ -1,8 +1,8 @@
 """Gaps of the elements along a motion: at every step, and as polynomials within a step.
 
 A gap over a step is the polynomial with which the method itself looks for crossings: the cubic
-through value and rate at both ends for RK4, and the exact series for flow maps. A motion therefore
-grazes a flank where the method begins to find a contact.
+through value and rate at both ends for RK4, and the exact series for flow maps and Taylor series. A
+motion therefore grazes a flank where the method begins to find a contact.
 """
 
 from typing import Any, NamedTuple

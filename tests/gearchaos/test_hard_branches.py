@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import gearchaos
+from gearchaos.engine.bounding import find_boundaries
 from gearchaos.engine.branching import find_branches
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
@@ -292,3 +293,25 @@ def test_maps_are_used_where_the_values_of_a_parameter_share_them(swept, low, hi
         values = [[special.value for special in branch.specials] for branch in (one, other)]
         assert kinds[0] == kinds[1]
         assert values[0] == pytest.approx(values[1], abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["flow_map", "taylor"])
+def test_boundaries_of_machines_are_followed_by_series(method):
+    text = MASS.format(**BASE | {"stiffness": 1.0}, swept="frequency", low=1.2, high=2.0)
+    text = text.replace('method = "taylor"', f'method = "{method}"')
+    text += """
+[second_sweep]
+parameter = "force.one.amplitude"
+from = 0.2
+to = 4.0
+count = 9
+"""
+    config = gearchaos.Configuration.from_toml(text, "mass.toml")
+    found = find_boundaries(gearchaos.run(config), lines=1)
+    assert found.metadata["method"] == "taylor"
+    grazing = [one for one in found.boundaries if one.kind == GRAZING]
+    assert len(grazing) == 2
+    for one in grazing:
+        frequency, amplitude = one.values.T
+        response = amplitude / np.hypot(1.0 - frequency**2, BASE["damping"] * frequency)
+        assert response == pytest.approx(1.0, abs=1e-10)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.method_choice import for_continuation, with_method
+from gearchaos.engine.method_choice import with_method
 from gearchaos.errors import ConfigurationError
 
 from .commands import run_module
@@ -52,11 +52,6 @@ def test_metadata_name_the_method_in_words(by_series):
         "Taylor series: series of the motion of a machine, exact between crossings and at them; "
         "4 steps per period, resolved crossings"
     )
-
-
-def test_continuations_of_a_machine_take_flow_maps():
-    assert for_continuation(config("taylor")).integration.method == "flow_map"
-    assert for_continuation(config("rk4")) == config("rk4")
 
 
 def test_auto_takes_series_where_rk4_has_fine_steps_and_every_speed_maps_of_its_own():

@@ -3,9 +3,10 @@
 import numba
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, Status, integrate
+from gearchaos_kernels import Plan, Status, gap_polynomials, gaps_along, integrate
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from numpy.polynomial import polynomial
 
 from .oscillator import Oscillators
 from .piecewise import (
@@ -57,6 +58,42 @@ def test_contact_and_crossings_are_those_of_flow_maps(size):
     maps = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map"))
     assert found.contact == pytest.approx(maps.contact, rel=1e-10, abs=1e-10)
     assert found.slowest_crossing == pytest.approx(maps.slowest_crossing, rel=1e-10)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_gaps_within_a_step_are_those_of_flow_maps(size):
+    """The states are any numbers, so that each element begins steps on any flank."""
+    machines, _, _, _, _ = exact(*size)
+    system, steps = lanes_of(machines), 120
+    states = np.random.default_rng(4).normal(size=(system.lanes, steps + 1, 2 * size[0]))
+    gaps = gaps_along(system, states, steps)
+    samples = np.arange(system.lanes) * 7 % steps
+    flanks = gaps.flank[np.arange(system.lanes), samples]
+    assert {0, 1, 2} <= set(flanks.ravel().tolist()) or size[1] == 1
+    places = np.linspace(-1.0, 1.0, 5)
+    for element in range(size[1]):
+        along = [
+            polynomial.polyval(
+                places,
+                gap_polynomials(
+                    system,
+                    Plan(steps, **SERIES | {"method": method}),
+                    states,
+                    gaps,
+                    (samples, element),
+                ).T,
+            )
+            for method in ("taylor", "flow_map")
+        ]
+        assert along[0] == pytest.approx(along[1], rel=1e-11, abs=1e-12)
+
+
+def test_gaps_of_steps_longer_than_a_series_reaches_are_not_numbers():
+    system = lanes_of([random_machine(1, 2, 1)])
+    states = np.zeros((1, 2, 4))
+    gaps = gaps_along(system, states, 1)
+    terms = gap_polynomials(system, Plan(1, **SERIES), states, gaps, (np.zeros(1, dtype=int), 0))
+    assert np.isnan(terms).all()
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)

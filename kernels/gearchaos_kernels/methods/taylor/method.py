@@ -19,6 +19,7 @@ from gearchaos_kernels.memory.rows import STRIDE, VECTOR, rows
 from gearchaos_kernels.methods.protocol import Integers, Method, Share, cut
 from gearchaos_kernels.methods.substeps import grids, multiple_of
 from gearchaos_kernels.methods.taylor import vectors
+from gearchaos_kernels.methods.taylor.along import gap_terms
 from gearchaos_kernels.methods.taylor.crossings import count_suspects, cross, find_crossings
 from gearchaos_kernels.methods.taylor.expansion import expand
 from gearchaos_kernels.methods.taylor.layout import REACH, rows_needed, series_rows
@@ -200,7 +201,7 @@ TAYLOR = Method(
     amplification=lambda z: np.exp(z.real),
     stable_reach=None,
     is_kept=lambda _system, _plan, _scene: True,
-    gap_terms=None,
+    gap_terms=gap_terms,
     maps_per_step=maps_per_step,
     room=room,
     workspace=workspace,
