@@ -77,12 +77,13 @@ def exact_maximum(start):
     return max(found)
 
 
+@pytest.mark.parametrize(("method", "steps"), [("flow_map", 24), ("taylor", 24), ("taylor", 8)])
 @pytest.mark.parametrize("start", [(0.2, 0.44), (0.3, 0.44), (0.5, 0.4), (0.8, 0.3)])
-def test_an_extreme_behind_a_change_of_another_element_is_exact(start):
+def test_an_extreme_behind_a_change_of_another_element_is_exact(start, method, steps):
     """The soft stop is met less than a step before the mass turns next to the hard one."""
     config = gearchaos.Configuration.from_toml(TWO_STOPS, "stops.toml")
     system = system_of(config, {"frequency": np.array([1.0])})
-    plan = Plan(24, 0, 1, 1, method="flow_map", history_periods=1)
+    plan = Plan(steps, 0, 1, 1, method=method, history_periods=1)
     history = integrate(system, np.array([start]), plan).history
     beyond, _ = nearest_extremes(system, plan, history, np.array([STOP]), np.array([np.nan]))
     assert beyond[0] == pytest.approx(exact_maximum(start) - 1.0, abs=1e-11)
