@@ -12,7 +12,6 @@ draws it over the map. The path of the file goes to stdout, the table of the cur
 else to stderr.
 """
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -75,32 +74,27 @@ class BoundariesOptions(NamedTuple):
 def _boundaries(options: BoundariesOptions) -> None:
     from gearchaos.engine.bounding import find_boundaries
     from gearchaos.engine.running import compiling
+    from gearchaos.finishing import keep_beside
     from gearchaos.results.files.atomic_file import check_output
     from gearchaos.results.files.boundary_file import write_boundaries
 
     source = Path(options.source)
     output = options.output or Path(f"{source.stem}_boundaries.h5")
     check_output(output, options.overwrite)
+
+    def keep(some: "BoundarySet") -> None:
+        words = count_of(len(some.boundaries), "curve")
+        keep_beside(output, words, lambda path: write_boundaries(path, some, overwrite=True))
+
     with compiling():
         result = _result(source)
         places = placed_coordinates(options.at, result.axes, result.axis)
         result = result.sel("within", **places) if places else result
-        found = find_boundaries(
-            result, options.source, options.periods, options.lines, partial(_keep, output)
-        )
+        found = find_boundaries(result, options.source, options.periods, options.lines, keep)
     for line in table(found):
         say(line)
     write_boundaries(output, found, options.overwrite)
     print(output, flush=True)
-
-
-def _keep(output: Path, found: "BoundarySet") -> None:
-    """Write the boundaries that were found before an interrupt, beside the output."""
-    from gearchaos.results.files.boundary_file import write_boundaries
-
-    kept = output.with_name(f"{output.stem}_interrupted.h5")
-    write_boundaries(kept, found, overwrite=True)
-    say(f"{kept}: the {len(found.boundaries)} curves that were found before the interrupt")
 
 
 def _result(source: Path) -> "Result":

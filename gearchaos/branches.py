@@ -63,6 +63,7 @@ class BranchesOptions(NamedTuple):
 def _branches(options: BranchesOptions) -> None:
     from gearchaos.engine.branching import find_branches
     from gearchaos.engine.running import compiling
+    from gearchaos.finishing import keep_beside
     from gearchaos.results.files.atomic_file import check_output
     from gearchaos.results.files.branch_file import write_branches
 
@@ -72,8 +73,13 @@ def _branches(options: BranchesOptions) -> None:
     result = _result(source)
     places = placed_coordinates(options.at, result.axes, result.axis)
     result = result.sel("within", **places) if places else result
+
+    def keep(some: "BranchSet") -> None:
+        words = count_of(len(some.branches), "branch", "branches")
+        keep_beside(output, words, lambda path: write_branches(path, some, overwrite=True))
+
     with compiling():
-        found = find_branches(result, options.source, options.periods)
+        found = find_branches(result, options.source, options.periods, keep)
     for line in table(found):
         say(line)
     write_branches(output, found, options.overwrite)

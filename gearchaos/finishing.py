@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,16 @@ WRITTEN_BY = dict.fromkeys((".png", ".pdf", ".svg", ".eps", ".jpg", ".tiff"), "p
 WRITTEN_BY |= dict.fromkeys((".csv", ".mat", ".parquet"), "export")
 WRITTEN_BY |= {".html": "report"}
 """Endings of files that other commands write from a result."""
+
+
+def keep_beside(output: Path, words: str, write: Callable[[Path], None]) -> None:
+    """Write what was found before an interrupt to a file beside the output, and report its path.
+
+    ``words``: what was found, such as "12 curves"; ``write`` receives the path of the file.
+    """
+    kept = output.with_name(f"{output.stem}_interrupted.h5")
+    write(kept)
+    say(f"{kept}: {words}, found before the interrupt")
 
 
 def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:

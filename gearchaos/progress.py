@@ -118,19 +118,22 @@ def notice(text: str) -> Iterator[None]:
         timer.cancel()
 
 
-def progress(total: int, done: int = 0, unit: str = "lanes") -> Any:
+def progress(total: int | None, done: int = 0, unit: str = "lanes") -> Any:
     """Return a tqdm bar that prints how many units of ``total`` are done.
 
-    On a terminal this is a bar; elsewhere, a plain line every half minute and one at the end.
+    On a terminal this is a bar; elsewhere, a plain line every half minute and one at the end. If
+    the total is not known (None), units are counted, without a line at the end.
     """
     bar, lines = _bars()
     # The progress of a single unit is of no interest.
-    disable = _quiet.get() or total < 2
+    disable = _quiet.get() or (total is not None and total < 2)
     common: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
     common |= {"disable": disable, "miniters": 1}
     if sys.stderr is not None and sys.stderr.isatty():
         return bar(**common, dynamic_ncols=True)
     text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
+    if total is None:
+        text = "{n}{unit}, {rate_noinv_fmt}, {elapsed}"
     return lines(**common, mininterval=SECONDS_BETWEEN_LINES, bar_format=text, file=StringIO())
 
 
@@ -145,7 +148,8 @@ def _bars() -> tuple[Any, Any]:
 
     class Lines(Bar):
         def display(self, **_: object) -> None:
-            if self.n > self.last_print_n:
+            late = self.format_dict["elapsed"] >= SECONDS_BETWEEN_LINES
+            if self.n > self.last_print_n and (self.total is not None or late):
                 say(str(self))
 
     return Bar, Lines

@@ -38,6 +38,19 @@ def together(
     return [found[number] for number in range(len(searches))]
 
 
+def counting(
+    answers_to: Callable[[Sequence[Asked]], Sequence[Answered]], count: Callable[[int], object]
+) -> Callable[[Sequence[Asked]], Sequence[Answered]]:
+    """Return a function that answers requests and counts them."""
+
+    def counted(requests: Sequence[Asked]) -> Sequence[Answered]:
+        answers = answers_to(requests)
+        count(len(requests))
+        return answers
+
+    return counted
+
+
 def run(
     search: Search[Asked, Answered, Found],
     answers_to: Callable[[Sequence[Asked]], Sequence[Answered]],

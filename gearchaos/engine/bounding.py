@@ -11,13 +11,13 @@ from gearchaos.arrays import Complex, Floats, Integers, Mask
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way, repeats_sooner
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
-from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
+from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passed, Passing, passed_of
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_range import only_map_parameter
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
-from gearchaos.dynamics.side_by_side import Found, run, together
+from gearchaos.dynamics.side_by_side import Found, counting, run, together
 from gearchaos.engine.branching import (
     BranchSearch,
     flank_name,
@@ -143,20 +143,22 @@ def find_boundaries(
     )
     search = _BoundarySearch(over, run_of_search, longest, result)
     places = search.lines(lines)
-    with one_thread(), progress(len(places), unit="lines") as bar:
+    searched = 0
+    with one_thread(), progress(None, unit="orbits") as bar:
+        search.count = bar.update
         try:
             search.begin_with_changes(result)
             for first in range(0, len(places), SIDE_BY_SIDE):
                 check()
                 some = places[first : first + SIDE_BY_SIDE]
                 branches = search.along_lines(result, some)
-                bar.update(len(some))
+                searched += len(some)
                 traced = count_of(branches, "branch", "branches")
                 found = count_of(len(search.found), "boundary", "boundaries")
                 say(f"{count_of(len(some), 'line')}: {traced}; {found}")
             search.from_changes()
         except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"{bar.n} of {len(places)} lines were searched")
+            interrupt.add_note(f"{searched} of {len(places)} lines were searched")
             if keep is not None and search.found:
                 keep(search.described(result))
             raise
@@ -223,6 +225,7 @@ class _BoundarySearch:
         self.over, self.run, self.longest = over, run, longest
         self.found: list[TracedBoundary] = []
         self.left: Changes
+        self.count: Callable[[int], object] = lambda _number: None
         period, states = result.lanes("period"), result.lanes("end_state")
         moving = states[np.isfinite(states).all(axis=1) & (period > 0) & (period <= longest)]
         if not moving.size:
@@ -276,7 +279,8 @@ class _BoundarySearch:
             across = known.axis_name(self.over.parameters[1 - line.number])
             searches.append((search, search.following(search.motions(of_line, across))))
         plan = self.run.plan
-        _traced_together([(search.over.steps_of_maps(plan), one) for search, one in searches])
+        pending = [(search.over.steps_of_maps(plan), one) for search, one in searches]
+        _traced_together(pending, self.count)
         for line, (search, _) in zip(lines, searches, strict=True):
             axis = known.axis_name(self.over.parameters[line.number])
             traced = count_of(len(search.found), "branch", "branches")
@@ -353,7 +357,7 @@ class _BoundarySearch:
             curve = over.curve(self.run.plan, one.period, self.scale)
             guess = np.append(one.state / self.scale, self.over.along(line, one.shares))
             searches.append((curve.plan.steps_per_period, _through(curve, guess)))
-        traced = _traced_together(searches)
+        traced = _traced_together(searches, self.count)
         return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
 
     def _multipliers(self, changes: Changes) -> Complex:
@@ -370,7 +374,7 @@ class _BoundarySearch:
             )
             for one in changes.of(needed).each()
         ]
-        for number, passed in zip(needed.tolist(), passed_of(requests), strict=True):
+        for number, passed in zip(needed.tolist(), self._answers(requests), strict=True):
             found[number] = passed.multipliers
         return found
 
@@ -412,9 +416,13 @@ class _BoundarySearch:
         direction[self.scale.size + number] = 1.0
         return direction
 
+    def _answers(self, requests: Sequence[Passing]) -> Sequence[Passed]:
+        """Return the orbits of some requests, and count them."""
+        return counting(passed_of, self.count)(requests)
+
     def _follow(self, searches: list[Following["_Begun"]]) -> None:
         """Follow the boundaries through points that lie on none that is known."""
-        begun = run(together(searches), passed_of)
+        begun = run(together(searches), self._answers)
         new = self._unknown(begun)
         for one in begun:
             if one.start is None and one.special is not None:
@@ -424,7 +432,7 @@ class _BoundarySearch:
         self._trace([one for one in new if one.equations.kind != NEIMARK_SACKER])
         # Curves of pairs end at resonances, where several multipliers may meet: they start there.
         self._trace([*self._turning(self.found[before:]), *turning])
-        meeting = run(together(self._meeting_grazings(self.found[before:])), passed_of)
+        meeting = run(together(self._meeting_grazings(self.found[before:])), self._answers)
         self._trace(self._unknown(meeting))
 
     def _trace(self, begun: list["_Begun"]) -> None:
@@ -436,18 +444,18 @@ class _BoundarySearch:
                 same[0].append(one.start)
             elif one.start is not None:
                 starts.append((one.equations, [one.start]))
-        traced = run(together([tracing(*one) for one in starts]), passed_of)
+        traced = run(together([tracing(*one) for one in starts]), self._answers)
         for boundary in (one for some in traced for one in some):
             # Orbits of longer periods are the same at each of their section points. Points crowd
             # next to grazings, so that the middle is that of the length.
             positions = boundary.positions
             middle = boundary.points[int(np.argmin(np.abs(positions - positions[-1] / 2.0)))]
-            if not run(self._held(_Begun(boundary.equations, middle)), passed_of):
+            if not run(self._held(_Begun(boundary.equations, middle)), self._answers):
                 self.found.append(boundary)
 
     def _unknown(self, begun: Sequence["_Begun"]) -> list["_Begun"]:
         """Return the points within both ranges that begin boundaries which are not known."""
-        held = run(together([self._held(one) for one in begun]), passed_of)
+        held = run(together([self._held(one) for one in begun]), self._answers)
         return [
             one
             for one, is_held in zip(begun, held, strict=True)
@@ -573,15 +581,19 @@ class _BoundarySearch:
         )
 
 
-def _traced_together(searches: Sequence[tuple[int, Finding[Found]]]) -> list[Found]:
+def _traced_together(
+    searches: Sequence[tuple[int, Finding[Found]]], count: Callable[[int], object]
+) -> list[Found]:
     """Return the results of searches along lines; those with equal steps share calls.
 
-    Each has the number of steps per period that its curves take.
+    Each has the number of steps per period that its curves take. ``count`` receives the numbers of
+    orbits that are computed.
     """
     found: dict[int, Found] = {}
-    for count in sorted({steps for steps, _ in searches}):
-        same = [at for at, (steps, _) in enumerate(searches) if steps == count]
-        results = run(together([searches[at][1] for at in same]), defects_of)
+    for steps in sorted({one for one, _ in searches}):
+        same = [at for at, (one, _) in enumerate(searches) if one == steps]
+        search = together([searches[at][1] for at in same])
+        results = run(search, counting(defects_of, count))
         found.update(zip(same, results, strict=True))
     return [found[at] for at in range(len(searches))]
 

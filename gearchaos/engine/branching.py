@@ -20,7 +20,7 @@ from gearchaos.dynamics.branches import (
     tracing,
 )
 from gearchaos.dynamics.curve_defects import Finding, defects_of
-from gearchaos.dynamics.side_by_side import run, together
+from gearchaos.dynamics.side_by_side import counting, run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.method_choice import without_maps
 from gearchaos.engine.provenance import provenance
@@ -34,7 +34,7 @@ from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.outputs.variable import Variable
-from gearchaos.progress import say
+from gearchaos.progress import progress, say
 from gearchaos.records.branch import HALVING, PERIOD_DOUBLING, PeriodicBranch, SpecialPoint
 from gearchaos.records.period import coordinate_scale
 from gearchaos.results.files.branch_file import BranchSet
@@ -73,7 +73,10 @@ def require_range(config: Configuration, name: str) -> None:
 
 
 def find_branches(
-    result: Result, name: str = "the result", longest: int = MOST_PERIODS
+    result: Result,
+    name: str = "the result",
+    longest: int = MOST_PERIODS,
+    keep: Callable[[BranchSet], None] | None = None,
 ) -> BranchSet:
     """Follow every periodic motion that a sweep found, through the whole range of the sweep.
 
@@ -85,6 +88,8 @@ def find_branches(
         Name of the result in messages.
     longest : int
         Longest period, in excitation periods.
+    keep : callable, optional
+        Called with the branches found so far if the search is interrupted.
 
     Returns
     -------
@@ -120,8 +125,13 @@ def find_branches(
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
     search = BranchSearch(over, run_of_continuation(config, over.own_maps), longest)
-    with one_thread():
-        search.follow(search.motions(result, swept[0]))
+    with one_thread(), progress(None, unit="orbits") as bar:
+        try:
+            search.follow(search.motions(result, swept[0]), bar.update)
+        except KeyboardInterrupt:
+            if keep is not None and search.found:
+                keep(_described(search, result.variables[swept[0]]))
+            raise
         return _described(search, result.variables[swept[0]])
 
 
@@ -207,9 +217,12 @@ class BranchSearch:
                 sections[lane] = section[: periods[lane]]
         return sections
 
-    def follow(self, motions: Sequence[_Motion]) -> None:
-        """Follow the orbits of motions that lie on no known branch, with doublings."""
-        run(self.following(motions), defects_of)
+    def follow(self, motions: Sequence[_Motion], count: Callable[[int], object]) -> None:
+        """Follow the orbits of motions that lie on no known branch, with doublings.
+
+        ``count`` receives the numbers of orbits that are computed.
+        """
+        run(self.following(motions), counting(defects_of, count))
 
     def following(self, motions: Sequence[_Motion]) -> Finding[None]:
         """Return the search of `follow`.

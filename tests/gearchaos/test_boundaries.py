@@ -345,7 +345,7 @@ def test_an_interrupt_keeps_what_was_found_and_leaves_an_earlier_file(files, tmp
     assert re.search(r"[1-9]\d* of 80 lines were searched", err)
     assert earlier.read_bytes() == b"earlier"
     kept = tmp_path / "earlier_interrupted.h5"
-    (count,) = re.findall(rf"{kept}: the (\d+) curves that were found before the interrupt", err)
+    (count,) = re.findall(rf"{kept}: (\d+) curves?, found before the interrupt", err)
     assert len(read_boundaries(kept).boundaries) == int(count) > 0
 
 

@@ -1,6 +1,10 @@
 """Whole branches of periodic orbits, against independent exact values and from the command line."""
 
 import json
+import os
+import re
+import signal
+import time
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +25,7 @@ from gearchaos.records.branch import (
 )
 from gearchaos.results.files.branch_reader import read_branches
 
-from .commands import run_module
+from .commands import begin, is_running, run_module
 from .short_sweeps import PUMP
 
 
@@ -310,6 +314,23 @@ def test_the_command_writes_branches_and_lists_special_points(files):
             assert f"pitch_error = {special.value:.10g}" in done.err
             (place,) = np.nonzero(one.arclength == special.arclength)
             assert one.value[place] == pytest.approx([special.value])
+
+
+def test_an_interrupt_keeps_the_branches_that_were_found(files, tmp_path):
+    earlier, log = tmp_path / "earlier.h5", tmp_path / "log"
+    earlier.write_bytes(b"earlier")
+    words = ("sweep.h5", "--periods", "16", "-o", str(earlier), "--overwrite", "--log", str(log))
+    process, ended = begin("gearchaos.branches", words, files[0])
+    found = re.compile(r"period \d+: \d+ orbits")
+    while is_running(process) and not (log.exists() and found.search(log.read_text())):
+        time.sleep(0.005)
+    os.kill(process, signal.SIGINT)
+    code, out, err = ended()
+    assert (code, out) == (130, "")
+    assert earlier.read_bytes() == b"earlier"
+    kept = tmp_path / "earlier_interrupted.h5"
+    (count,) = re.findall(rf"{kept}: (\d+) branch(?:es)?, found before the interrupt", err)
+    assert len(read_branches(kept).branches) == int(count) > 0
 
 
 def test_branches_meet_where_a_period_doubles(files):
