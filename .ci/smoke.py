@@ -1,9 +1,9 @@
-"""Use every extra once, on small scenes: do the installed versions of all packages work together?
+"""Use every extra once on small scenes, to check that the installed packages work together.
 
-python .ci/smoke.py, in an environment in which gearchaos is installed with all its extras. It
-prints the versions, then every command with its seconds and what it wrote to stderr, and ends with
-code 1 at the first command that fails. Warnings of packages fail nothing; they are printed, since
-they announce what the next version will do.
+Run ``python .ci/smoke.py`` in an environment where gearchaos is installed with all its extras. The
+script prints the versions, then every command with its run time and its output on stderr. It exits
+with code 1 at the first command that fails. Warnings of packages do not count as failures. They are
+printed because they announce changes of future versions.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ from pathlib import Path
 from re import match
 from tempfile import TemporaryDirectory
 
-import panel  # noqa: F401  Its models are part of the page.
+import panel  # noqa: F401  Registers the models of the page.
 from bokeh.client import pull_session
 from bokeh.models import DataRenderer
 from bokeh.plotting import figure
@@ -36,7 +36,7 @@ COMMANDS = (
     ["plot", "main.h5", "--stages", "--output", "main.png"],
     ["plot", "map.h5", "--output", "map.pdf"],
     ["stages", "main.h5", "--refine", "0.1"],
-    # Reads the configuration that the sweep has stored.
+    # This command reads the configuration that the sweep has stored.
     ["response", "main.h5", "--at", "11.0", "--periods", "20", "--output", "response.h5"],
     ["plot", "response.h5", "--output", "response.svg"],
     *(["export", "main.h5", f"main.{ending}"] for ending in ("csv", "parquet", "mat")),
@@ -60,12 +60,12 @@ def main() -> None:
 
 
 def command(words: list[str]) -> list[str]:
-    """Return how a command of gearchaos is started."""
+    """Return the command line that starts a command of gearchaos."""
     return [sys.executable, "-m", f"gearchaos.{words[0]}", *words[1:]]
 
 
 def run(words: list[str], folder: str) -> None:
-    """Run a command in a folder, and print its seconds and what it wrote to stderr."""
+    """Run a command in a folder, and print its run time and its output on stderr."""
     began = time.monotonic()
     done = subprocess.run(
         command(words), cwd=folder, stdout=subprocess.DEVNULL, stderr=-1, text=True
@@ -80,7 +80,7 @@ def run(words: list[str], folder: str) -> None:
 
 
 def explore(result: str, folder: str) -> None:
-    """Open the page of a result as a browser does, and see that it shows points and no fault."""
+    """Open the page of a result as a browser does, and check that it has charts and no error."""
     words, began = ["explore", result, "--no-browser", "--port", "0"], time.monotonic()
     with subprocess.Popen(command(words), cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:

@@ -6,8 +6,8 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
-# The same examples on every run: a failure is a failure of the change that was made, and not of a
-# machine that is busy.
+# Every run draws the same examples and has no time limit: a failure comes from a change of the
+# code, not from chance or a busy machine.
 TIMED = [HealthCheck.too_slow]
 settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=TIMED
@@ -26,39 +26,39 @@ FIRST += (
     "teeth",
 )
 FIRST += ("twin", "leaks", "threads", "hard_groups", "swept_parameters", "shard_option", "accuracy")
-"""Files that run first, in this order: they take longest, or compile what many others need.
+"""Files that run first, in this order: they take longest, or compile loops that others need.
 
-The first one compiles its scenes whatever is in the cache.
+The first one always compiles its scenes, even if the cache contains them.
 """
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config):
-    """Use all cores unless -n says how many, or somebody wants to look into this process.
+    """Run tests on all cores, unless -n or an option for debugging in this process is given.
 
-    With one process more than there are: some tests wait for a browser, a scheduler or a disk.
+    There is one more process than cores: some tests wait for a browser, a scheduler or a disk.
     """
     option = config.option
     looked_into = option.usepdb or option.trace or option.capture == "no"
-    if hasattr(config, "workerinput") or looked_into:  # A worker starts none of its own.
+    if hasattr(config, "workerinput") or looked_into:  # A worker starts no workers.
         return
     if getattr(option, "numprocesses", 0) is None:
         option.numprocesses = 1 + (os.cpu_count() or 1)
-        # A file in one process: what its tests compile is compiled once.
+        # Each file runs in one process, so that its loops are compiled once.
         option.dist = "loadfile"
         option.loadscopereorder = False
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files that are told to be first, in their order."""
+    """Run the files of `FIRST` first, in this order."""
     places = {f"test_{name}": place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: places.get(item.path.stem, len(FIRST)))
 
 
 def pytest_collection_finish(session):
-    """Take what is imported out of the garbage collector's sight: it stays to the end.
+    """Exclude all imported objects from garbage collection, because they exist until the end.
 
-    Where several processes run tests, let none compile what another one is compiling.
+    If several processes run tests, each one waits for loops that another one is compiling.
     """
     if hasattr(session.config, "workerinput"):
         from .gearchaos.compiled_once import install

@@ -141,7 +141,7 @@ def _parameters_differ(config: Tables) -> Iterator[Fault]:
     parameters = [sweep.parameter for sweep in config.sweeps.values()]
     if len(set(parameters)) < len(parameters):
         remedy = "sweep another parameter, or drop [second_sweep]"
-        rule = "is what [sweep] sweeps already"
+        rule = "is already swept by [sweep]"
         yield Fault("second_sweep.parameter", rule, remedy, parameters[0])
 
 

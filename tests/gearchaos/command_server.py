@@ -1,11 +1,11 @@
-"""A process that has imported what commands import, and forks to run each of them as a process.
+"""A process that imports the modules of all commands once, and forks to run each command.
 
-Its arguments name more modules to import. It reads one JSON list a line: the number of the request,
-module, arguments, folder, the files for stdin, stdout and stderr, more variables of the
-environment, and the size of the largest file that may be written, or null. It answers with the
-number of the process, and when that has ended with its exit code, each on a line after the number
-of the request: several commands may run at the same time. Everything but the imports happens as in
-a process of its own.
+Its arguments name more modules to import. Each line of its input is a JSON list: the number of the
+request, module, arguments, folder, the files for stdin, stdout and stderr, more environment
+variables, and the size of the largest file that may be written, or null. The server answers with
+the number of the process when it begins, and with its exit code when it ends. Every answer is a
+line that begins with the number of the request, because several commands may run at the same time.
+Except for the imports, a command runs as in a new process.
 """
 
 import atexit
@@ -32,7 +32,7 @@ import gearchaos.figures.response_page
 import gearchaos.figures.sweep_page  # noqa: F401
 
 LONGEST = 3600
-"""Seconds after which a command is killed: it hangs, however busy the machine is."""
+"""Seconds after which a command is killed: a longer command hangs, also on a busy machine."""
 
 
 def main() -> None:
@@ -40,10 +40,10 @@ def main() -> None:
     for name in sys.argv[1:]:
         importlib.import_module(name)
     compiled_once.install()
-    # What Numba would import in every process before it loads the first kernel.
+    # Otherwise Numba would import these in every process before it loads the first kernel.
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
-    # A collection would write to every object of this process, and so copy its memory.
+    # A garbage collection would write to every object, and so copy the memory of this process.
     gc.freeze()
     for line in sys.stdin:
         bury()
@@ -53,14 +53,14 @@ def main() -> None:
 
 
 def bury() -> None:
-    """Take note of processes that have ended, so that the system forgets them."""
+    """Collect the exit codes of ended processes, so that the system removes their entries."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
 
 
 def keep(request: int, *command: Any) -> NoReturn:
-    """Fork once more to run a command, and answer when it begins and when it has ended."""
+    """Fork again to run a command; answer when the command begins and when it has ended."""
     process = os.fork()
     if process == 0:
         run(*command)
@@ -70,7 +70,7 @@ def keep(request: int, *command: Any) -> NoReturn:
 
 
 def answer(request: int, number: int) -> None:
-    """Write a line at once, so that those of several processes do not mix."""
+    """Write a line in one call, so that lines of several processes do not mix."""
     os.write(1, f"{request} {number}\n".encode())
 
 
@@ -82,9 +82,9 @@ def run(
     variables: dict[str, str],
     largest_file: int | None,
 ) -> None:
-    """Become the process of one command, and end as it ends."""
+    """Run one command in this process, and exit with its exit code."""
     signal.alarm(LONGEST)
-    # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
+    # A test run in the background may ignore Ctrl-C, and its child processes inherit this.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(folder)
     for descriptor, name in enumerate(files):

@@ -1,4 +1,4 @@
-"""A small sweep, and the means to run commands on it as a user does."""
+"""A small sweep, and functions that run commands on it as a user does."""
 
 import atexit
 import json
@@ -86,13 +86,13 @@ LINEAR = (
     *("--set", "pitch_error.phase_deg=0.0"),
     *("--set", 'outputs.section=["delta_5"]'),
 )
-"""The smallest scene, two states of a linear pair, where it does not matter what is computed."""
+"""The smallest scene, a linear pair with two states, for tests that work with any scene."""
 
 HANGS = 1800.0
-"""Seconds after which what has not happened never will, on a busy machine either."""
+"""Time limit in seconds: a command that takes longer hangs, also on a busy machine."""
 
 PAGE_HANGS = 300.0
-"""The same for what a page shows: the longest wait is for a kernel that is compiled meanwhile."""
+"""The same limit for a page in a browser; its longest wait is the compilation of a kernel."""
 
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
@@ -117,7 +117,8 @@ def small_config(folder: Path) -> Path:
 def served(folder: Path, *words: str, stderr: Any = None) -> Iterator[str]:
     """Serve a page as a user does, in a process of its own; yield its address.
 
-    The process ends with the block, however that ends: waiting for it would otherwise never end.
+    The process is terminated at the end of the block, also after an exception. Otherwise the wait
+    for the process would never end.
     """
     command = [sys.executable, "-m", "gearchaos.explore", *words, "--no-browser", "--port=0"]
     pipe = subprocess.PIPE
@@ -130,7 +131,7 @@ def served(folder: Path, *words: str, stderr: Any = None) -> Iterator[str]:
 
 
 def until(page: Any, met: Callable[[], bool]) -> None:
-    """Wait until a page shows something that no locator describes."""
+    """Wait until a page meets a condition that no locator can describe."""
     end = time.monotonic() + PAGE_HANGS
     while not met():
         assert time.monotonic() < end
@@ -140,7 +141,7 @@ def until(page: Any, met: Callable[[], bool]) -> None:
 def run_module(
     module: str, *arguments: str, cwd: Path, preexec_fn: Callable | None = None, **options
 ) -> Ended:
-    """Run ``python -m module`` in a folder; see `begin`, but ``env`` is a whole environment."""
+    """Run ``python -m module`` in a folder; see `begin`, but ``env`` is the whole environment."""
     forks = hasattr(os, "fork")
     if preexec_fn is None and "env" not in options and forks:
         return begin(module, arguments, cwd, **options)[1]()
@@ -166,12 +167,13 @@ def begin(
     beside: bool = False,
     imported: Sequence[str] = (),
 ) -> tuple[int, Callable[[], Ended]]:
-    """Begin a command that need not import what it needs; return its process, and how to wait.
+    """Begin a command whose modules are imported; return its process and a function that waits.
 
-    The latter has a function ``said``, which returns what has been written to stderr by now.
-    A command that was begun before and not waited for, as of a test that has failed, is killed,
-    unless this one runs ``beside`` it. ``imported``: modules that only some commands import.
-    The way to wait refuses tracebacks; its ``unjudged``, for programs of others, does not.
+    The function waits for the end of the command and raises an error if stderr has a traceback.
+    It has two attributes: ``unjudged`` waits without this check, for programs of others; ``said``
+    returns the text in stderr so far. Earlier commands that still run, as after a failed test, are
+    killed unless this one runs ``beside`` them. ``imported``: modules that only some commands
+    import.
     """
     if not hasattr(os, "fork"):
         pytest.skip("needs processes that fork")
@@ -199,7 +201,7 @@ def begin(
 
 @cache
 def _folder() -> TemporaryDirectory:
-    """Make the folder of what all commands read and write; it goes with this process."""
+    """Make the folder for stdin, stdout and stderr of all commands; it is removed at exit."""
     folder = TemporaryDirectory()
     atexit.register(folder.cleanup)
     return folder
@@ -209,10 +211,10 @@ class Server:
     """The process of `command_server`, which runs commands."""
 
     def __init__(self, *modules: str) -> None:
-        """Start it, with more modules to import."""
+        """Start the process, with more modules to import."""
         pipe, script = subprocess.PIPE, Path(__file__).with_name("command_server.py")
         command = [sys.executable, str(script), *modules]
-        # Without a buffer: what has been answered and not read can then be seen.
+        # Without a buffer, `select` sees answers that have not been read.
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, bufsize=0)
         atexit.register(self._process.communicate)
         self._requests = 0
@@ -220,9 +222,9 @@ class Server:
         self._codes: dict[int, int] = {}
 
     def begin(self, words: list, beside: bool = False) -> tuple[int, int]:
-        """Begin a command, and return the number of the request and that of its process.
+        """Begin a command, and return the numbers of its request and its process.
 
-        Others that run are killed, unless it runs beside them.
+        Other running commands are killed, unless this one runs beside them.
         """
         while select([self._process.stdout], [], [], 0.0)[0]:
             self._read()
@@ -249,10 +251,10 @@ class Server:
         return self._codes.pop(request)
 
     def _read(self) -> None:
-        """Wait for an answer: the number of a process first, then its exit code."""
+        """Wait for an answer: first the number of a process, later its exit code."""
         line = self._process.stdout.readline()
         if not line:
-            _server.cache_clear()  # The next command gets another one.
+            _server.cache_clear()  # The next command starts another server.
             raise RuntimeError(f"the command server has ended with {self._process.wait()}")
         request, answer = map(int, line.split())
         if self._running.get(request) == 0:
@@ -273,12 +275,12 @@ def sweep(folder: Path, *arguments: str, **options) -> Ended:
 
 
 def names_in(folder: Path) -> list[str]:
-    """List what a folder holds, hidden files too."""
+    """Return the sorted names in a folder, those of hidden files too."""
     return sorted(path.name for path in folder.iterdir())
 
 
 def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
-    """Whether two results hold the same variables and parameters, bit for bit."""
+    """Return whether two results hold the same variables and parameters, bit for bit."""
     assert list(one) == list(other)
     assert one.parameters.keys() == other.parameters.keys()
     arrays = [(one[name], other[name]) for name in one]
@@ -290,7 +292,7 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
 
 
 def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
-    """Run a sweep, send it a signal once a block is finished; return exit code, stdout, stderr."""
+    """Run a sweep, send it a signal once a block is finished, and return how it ended."""
     process, ended = begin("gearchaos.sweep", arguments, folder)
     while is_running(process) and not list((folder / blocks).glob("*.block")):
         time.sleep(0.005)
@@ -300,7 +302,7 @@ def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
 
 
 def is_running(process: int) -> bool:
-    """Tell whether a process that was begun has not ended."""
+    """Return whether a process is still running."""
     with suppress(ProcessLookupError):
         os.kill(process, 0)
         return True

@@ -1,7 +1,8 @@
-"""Let processes of the tests that need the same loop at the same time compile it once.
+"""Let test processes that need the same loop at the same time compile it only once.
 
-Loops are kept on disk, so that later processes find them. Those that need one which another process
-is compiling would each compile it, too: here they wait for it, for a while.
+Compiled loops are kept on disk for later processes. Without this module, a process would also
+compile a loop that another process is compiling. With it, the process waits for the other one, for
+a limited time.
 """
 
 import time
@@ -15,21 +16,21 @@ except ImportError:  # Windows: every process compiles for itself.
     fcntl = None
 
 LONGEST = 120.0
-"""Seconds after which a process compiles for itself: whoever has the lock may be hanging."""
+"""Seconds after which a process compiles for itself: the process with the lock may be hanging."""
 
 _load, _save = KernelCache.load_overload, KernelCache.save_overload
 _held: dict[tuple[Any, Any], IO[str]] = {}
 
 
 def install() -> None:
-    """Replace how this process reads and writes loops, where files can be locked."""
+    """Replace the methods that load and save loops in this process, if files can be locked."""
     if fcntl is None:
         return
     KernelCache.load_overload, KernelCache.save_overload = load_overload, save_overload
 
 
 def load_overload(self: KernelCache, sig: Any, target_context: Any) -> Any:
-    """Load a loop, wait for whoever is compiling it, or take the lock to compile it."""
+    """Load a loop, wait for the process that compiles it, or take the lock to compile it."""
     found = _load(self, sig, target_context)
     if found is not None:
         return found
@@ -54,7 +55,7 @@ def _locked(lock: IO[str]) -> bool:
 
 
 def save_overload(self: KernelCache, sig: Any, data: Any) -> None:
-    """Keep a loop, and let others load it."""
+    """Save a loop, and release its lock so that other processes load it."""
     _save(self, sig, data)
     if lock := _held.pop((self, sig), None):
         lock.close()

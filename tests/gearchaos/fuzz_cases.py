@@ -1,4 +1,4 @@
-"""Commands given bad input under watch: what a case is, how it ends, and what is a failure."""
+"""Cases of bad input for commands, a watch that runs them, and the rules for a failure."""
 
 import json
 import os
@@ -18,13 +18,13 @@ from .fuzz_results import GOOD_AXES, damaged_result, good_result
 
 WORKER = Path(__file__).with_name("fuzz_worker.py")
 STARTING_SECONDS = 60.0
-"""Added to the time limit of the first case of a process, which imports and compiles."""
+"""Added to the time limit of the first case of a process: it imports and compiles."""
 
 COMPILING_SECONDS = 20.0
-"""Added to the time without an answer after which a case hangs: it may compile its kernels."""
+"""Added to the longest wait for an answer: a case may have to compile its kernels."""
 
 BUSY = 30.0
-"""Seconds in which a process is given one second of the processor, at least."""
+"""Longest time, in seconds, in which a process gets one second of processor time."""
 
 
 READERS = (
@@ -45,22 +45,22 @@ USERS = (
     "plot --output figure.png --dpi 50 --overwrite",
     "response --at=load=1 --periods 1 --output motion.h5 --overwrite",
 )
-"""Commands that need most of what a result file holds."""
+"""Commands that need most parts of a result file, and their options."""
 
 
 WORDINGS = ("units", "long_name", "symbol", "origin", "ancillary_variables")
-"""Attributes of a dataset that say what it is to people."""
+"""Attributes of a dataset that describe it to readers."""
 
 
 class Case(NamedTuple):
-    """One bad input and the command it is given to.
+    """One bad input and the command that reads it.
 
     Attributes
     ----------
     kind : str
-        What was done to the input, in a few words.
+        Change of the input, in a few words.
     number : int
-        Makes the case again.
+        Number that reproduces the case.
     command : str
         Module of `gearchaos` whose ``main`` runs.
     arguments : list of str
@@ -82,12 +82,13 @@ class Ending(NamedTuple):
     ----------
     code : int or None
     fault : str
-        "" where there is none.
+        "" if there is none.
     said : str
+        Text on stderr, otherwise on stdout.
     seconds : float
-        Of the processor, where it answered.
+        Processor time if the process answered, otherwise elapsed time.
     megabytes : int
-        The most that its process has had so far.
+        Largest memory of its process so far.
     """
 
     code: int | None
@@ -98,9 +99,9 @@ class Ending(NamedTuple):
 
 
 class Watch:
-    """A worker process with limits for each case; it is replaced where it hangs, dies or grows.
+    """A worker process with limits for each case; it is replaced if it hangs, dies or grows.
 
-    Seconds are those of the processor; an answer may take longer on a machine that is busy.
+    Seconds are processor time; on a busy machine an answer may take longer.
     """
 
     def __init__(self, folder: Path, seconds: float = 5.0, megabytes: int = 500) -> None:
@@ -114,7 +115,7 @@ class Watch:
         self._end()
 
     def run(self, cases: Iterable[Case]) -> Iterator[tuple[Case, Ending]]:
-        """Run cases one after the other; the input of each exists while its ending is looked at."""
+        """Run cases one after the other; the input of a case exists until the next one is taken."""
         for case in cases:
             yield case, self._run(case)
 
@@ -128,7 +129,7 @@ class Watch:
         seconds, megabytes = answer["seconds"], answer["megabytes"]
         fault = answer["escaped"] or _fault(case.command, answer)
         if seconds > allowed:
-            # It may have compiled a kernel, which it need not do twice.
+            # The first run may have compiled a kernel; the second run need not.
             again = self._ask([case.command, *case.arguments], BUSY * allowed)
             seconds = seconds if isinstance(again, str) else again["seconds"]
         if seconds > allowed:
@@ -177,7 +178,7 @@ class Watch:
 def configuration_cases(
     numbers: Iterable[int], folder: Path, dry_run_every: int = 0
 ) -> Iterator[Case]:
-    """Compute the sweeps that can be, some to a file; give others to `load_config` or a dry run."""
+    """Run the files of kind `COMPUTED`, some to a file; only load or dry-run the other files."""
     path = folder / "case.toml"
     computed = ["--output", str(folder / "case.h5"), "--overwrite", "--quiet"]
     for number in numbers:
@@ -198,9 +199,9 @@ def configuration_cases(
 
 
 def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
-    """Give result files to every command that reads them, in turn."""
+    """Give damaged result files to the commands that read results, in turn."""
     goods = _good_results(folder)
-    # Whatever opens it waits for ever.
+    # A process that opens this pipe waits forever.
     os.mkfifo(folder / "pipe")
     for number in numbers:
         path = folder / f"{number}.h5"
@@ -214,11 +215,11 @@ def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
 
 
 def lacking_cases(folder: Path) -> Iterator[Case]:
-    """Remove each dataset and attribute of a sound result in turn, and give it to its readers.
+    """Remove each dataset and attribute of a sound result in turn, and give the rest to commands.
 
-    Datasets, attributes of the file and meanings of flags go to every command, and other attributes
-    of a dataset to the commands in turn. Wordings of one kind are removed from all datasets at
-    once, and go to the command that draws figures.
+    Files that lack a dataset, an attribute of the file or meanings of flags go to every command.
+    Files that lack another attribute of a dataset go to one command each, in turn. Wordings of one
+    kind are removed from all datasets at once; these files go to the command that draws figures.
     """
     good, path = _good_results(folder)[0], folder / "lacking.h5"
     parts = parts_of(good)
@@ -237,7 +238,7 @@ def lacking_cases(folder: Path) -> Iterator[Case]:
 
 
 def forged_cases(folder: Path, readers: Sequence[str] = READERS) -> Iterator[Case]:
-    """Give every forgery to every command that reads result files, or to some of them."""
+    """Give every forgery to all commands that read result files, or to the given ones."""
     (good, *_), path = _good_results(folder), folder / "forged.h5"
     for number, name in enumerate(FORGERIES):
         forged_result(name, good, path)
@@ -247,7 +248,7 @@ def forged_cases(folder: Path, readers: Sequence[str] = READERS) -> Iterator[Cas
 
 
 def _good_results(folder: Path) -> list[bytes]:
-    # What is damaged may point to this one.
+    # Damaged files may point to this file.
     path = folder / "good.h5"
     contents = []
     for axes in reversed(GOOD_AXES):

@@ -1,4 +1,4 @@
-"""Configuration files, a third of them with a fault in them, each made again by its number."""
+"""Configuration files, a third of them with a fault; a number reproduces each file."""
 
 import random
 import re
@@ -10,7 +10,7 @@ from . import commands
 Random = random.Random
 
 SMALL = commands.SMALL.replace("phase_deg = 30.0", "phase_deg = 0.0")
-"""Without a phase, for which loops are compiled once more."""
+"""The small sweep without a phase; with a phase, other loops would have to be compiled."""
 
 PLACE = "[integration]"
 SECOND_SWEEPS = tuple(
@@ -39,7 +39,7 @@ NUMBERS = (
 )  # fmt: skip
 
 COMPUTED = "values moved"
-"""What is done to files that are to be computed: most of them are sound still."""
+"""Kind of change of the files that are computed; most of these files are still sound."""
 FACTORS = (0.5, 0.9, 1.1, 2.0, 0.0, -1.0, 1e-3, 1e3, 1e-9, 1e9, 1e-200, 1e150)
 OPTIONS = {
     "[integration]": ("error_check = 1.0", 'unstable = "raise"', "tolerance = 0.3"),
@@ -53,7 +53,7 @@ OPTIONS = {
 
 
 def configuration(number: int) -> tuple[str, bytes]:
-    """Return what was done to a configuration file, and the file: two in three are computed."""
+    """Return the kind of change and the changed configuration file; two in three are computed."""
     source = random.Random(f"configuration {number}")
     kind = COMPUTED if number % 3 else list(KINDS)[number // 3 % len(KINDS)]
     text = source.choice((SMALL, SMALL, *SECOND_SWEEPS) if number % 3 else FAULTY)
@@ -108,7 +108,7 @@ def _values_moved(source: Random, text: str) -> bytes:
     text = text.replace("count = 40", "count = 4")
     tables = source.sample(sorted(OPTIONS), source.choice((0, 1, 1, 2)))
     options = {table: source.choice(OPTIONS[table]) for table in tables}
-    # Whoever wants the steps of a pair ten million times as stiff waits for them.
+    # `unstable = "raise"` raises the number of steps: a much stiffer pair would take too long.
     most = 4 if 'unstable = "raise"' in options.values() else len(FACTORS)
     text = _with_numbers(source, text, (0, 1, 2), lambda number: _moved(source, number, most))
     for table, option in options.items():
@@ -209,6 +209,6 @@ KINDS: dict[str, Callable[[Random, str], bytes]] = {
     "nested deeply": _nested_deeply,
     "many keys": _many_keys,
     "long values": _long_values,
-    "encoded otherwise": _encoded_otherwise,
+    "another encoding": _encoded_otherwise,
     "random bytes": _random_bytes,
 }

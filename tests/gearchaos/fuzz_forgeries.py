@@ -1,4 +1,4 @@
-"""Result files that once took minutes, gigabytes or a traceback, each made again in a few lines."""
+"""Result files that may take minutes or gigabytes or cause a traceback, made in a few lines."""
 
 import io
 import re
@@ -26,7 +26,7 @@ BOOKKEEPING = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_FillValue"
 
 
 def parts_of(good: bytes) -> list[tuple[str, str]]:
-    """List the datasets of a file, each with "", and the attributes of each; one parameter."""
+    """List the datasets (name, "") and attributes (name, key) of a file, and one parameter."""
     parts: list[tuple[str, str]] = []
     with h5py.File(io.BytesIO(good)) as file:
         for name in ("/", *file, "parameters/load"):
@@ -47,7 +47,7 @@ def without(parts: Iterable[tuple[str, str]], good: bytes, path: Path) -> None:
 
 
 def _damaged_heaps(content: bytes) -> bytes:
-    # Over free space of no size the HDF5 library walks for ever.
+    # In free space of size 0 the HDF5 library would loop forever.
     place = content.index(b"GCOL") + 16
     head = b"GCOL\x01\x00\x00\x00" + (1 << 40).to_bytes(8, "little")
     within_one_another = (head + bytes([1, 0]) + bytes(14)) * 30_000
@@ -57,15 +57,15 @@ def _damaged_heaps(content: bytes) -> bytes:
 def _chunk_of_no_bytes(content: bytes) -> bytes:
     with h5py.File(io.BytesIO(content)) as file:
         chunk = file["motion"].id.get_chunk_info(0)
-    # Before its place are its size, the filters left out and where it begins along each axis.
+    # Size, filter mask and offsets of the chunk along each axis precede its address.
     place = content.index(chunk.byte_offset.to_bytes(8, "little"))
     return content[: place - 24] + bytes(32) + content[place + 8 :]
 
 
 def _one_heap_object(content: bytes) -> bytes:
-    """Let all texts of 7 bytes be the one of a million."""
+    """Let all texts of 7 bytes refer to the one text of a million bytes."""
     place = content.index((1_000_000).to_bytes(4, "little"))
-    # The length of a text is followed by the place of its heap and its number there.
+    # After the length of a text come the address of its heap and its number in the heap.
     heaps = (found.start().to_bytes(8, "little") for found in re.finditer(b"GCOL", content))
     small = re.compile(rb"\x07\0\0\0(" + b"|".join(map(re.escape, heaps)) + rb")....", re.DOTALL)
     return small.sub(lambda _: content[place : place + 16], content)
@@ -155,12 +155,12 @@ def _as_it_is(content: bytes) -> bytes:
 
 FORGERIES: dict[str, tuple[Callable[[h5py.File], None], Callable[[bytes], bytes]]] = {
     "damaged heaps": (_nothing, _damaged_heaps),
-    "many texts on one heap object": (_texts, _one_heap_object),
+    "many texts that refer to one heap object": (_texts, _one_heap_object),
     "20,000 texts": (_many_texts, _as_it_is),
     "a gigabyte in a megabyte": (_packed, _as_it_is),
     "a chunk that swells to 256 MB": (_swelling, _as_it_is),
     "a chunk of no bytes": (_nothing, _chunk_of_no_bytes),
-    "chunks that nobody has written": (_unwritten, _as_it_is),
+    "unwritten chunks": (_unwritten, _as_it_is),
     "10,000 datasets": (_many_datasets, _as_it_is),
     "1001 attributes": (_many_attributes, _as_it_is),
     "words of a later version": (_later_words, _as_it_is),

@@ -1,4 +1,4 @@
-"""Result files that are none, each made again by its number."""
+"""Damaged result files, and files that are no results; a number reproduces each file."""
 
 import os
 import random
@@ -75,16 +75,16 @@ def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
 
 
 def damaged_result(number: int, good: bytes, path: Path) -> str:
-    """Write a file that is a sound result no more, or hardly; say what was done to it.
+    """Write a damaged result file, or a file that is no result; return the kind of change.
 
     Parameters
     ----------
     number : int
-        Decides what is done.
+        Determines the change.
     good : bytes
         A sound result file.
     path : Path
-        File to be written. Files that it may point to lie in the same folder.
+        File to write. Files to which it may point are in the same folder.
     """
     source = random.Random(f"result {number}")
     kind = list(KINDS)[number % len(KINDS)]
@@ -138,7 +138,7 @@ def _edited(source: Random, good: bytes, path: Path) -> None:
         names = [*file, *(f"parameters/{name}" for name in file["parameters"])]
         for _ in range(source.choice((1, 1, 2))):
             name = source.choice(names)
-            # HDF5 refuses some of this; whatever has been done by then stays.
+            # HDF5 refuses some of these edits; the changes made before the error remain.
             with suppress(Exception):
                 source.choice(EDITS)(source, file, name)
     if source.random() < 0.5:
@@ -302,9 +302,9 @@ KINDS: dict[str, Callable[[Random, bytes, Path], None]] = {
     "bytes changed, no checksum": _flipped_without_the_checksum,
     "bytes changed, new checksum": _flipped_under_a_new_checksum,
     "edited": _edited,
-    "edited once more": _edited,
-    "edited again": _edited,
+    "edited, second": _edited,
+    "edited, third": _edited,
     "another HDF5 file": _another_hdf5_file,
-    "no HDF5 file": _no_hdf5_file,
+    "not an HDF5 file": _no_hdf5_file,
     "no file": _no_file,
 }

@@ -1,7 +1,7 @@
 """A process that runs commands one after the other and reports how each of them ended.
 
-It reads one JSON list a line, the command and its arguments, and answers with one JSON object a
-line. Whoever started it sees by its silence that a command hangs, and by its end that one crashed.
+Each line of its input is a JSON list, the command and its arguments. Each line of its output is a
+JSON object, the answer. If a command hangs, there is no answer; if it crashes, this process ends.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ class Paths(NamedTuple):
 
 def main() -> None:
     """Serve until the input ends."""
-    # More than is allowed: what is asked for and not used does not count.
+    # Above the limit of `Watch`, which does not count memory that is reserved but unused.
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     for line in sys.stdin:
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def run(command: str, arguments: list[str]) -> dict[str, object]:
-    """Run one command in this process: its exit code, what it wrote, and an escaped exception."""
+    """Run one command in this process; return exit code, output and an escaped exception."""
     out, err = io.StringIO(), io.StringIO()
     code, escaped, began = None, "", time.process_time()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -58,7 +58,7 @@ def run(command: str, arguments: list[str]) -> dict[str, object]:
 
 
 def _peak_megabytes() -> int:
-    # Not by getrusage: that begins at the peak of the process which has started this one.
+    # Not by getrusage, which begins at the peak of the parent process.
     status = Path("/proc/self/status").read_text()
     return int(status.partition("VmHWM:")[2].split()[0]) >> 10
 

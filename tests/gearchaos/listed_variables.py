@@ -1,4 +1,4 @@
-"""The variables of a sweep, for results that tests make by hand."""
+"""Variables of a sweep, for results that tests make by hand."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -29,7 +29,7 @@ def parameter(
     symbol: str = "",
     dims: tuple[str, ...] = (),
 ) -> Variable:
-    """Give a parameter of the model."""
+    """Return a parameter of the model."""
     return Variable(
         name, dims, "float64", units, long_name or name, symbol, values=values, origin=origin
     )
@@ -56,13 +56,13 @@ def sweep_variables(
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
-    The axes are second swept parameter, first swept parameter, realisation, start, direction, those
-    there are; ``states`` those of the scene in its order, ``section`` those recorded at so many
-    section points, ``contact`` and ``loads`` the ways of which they are told, ``chosen`` the
-    states of which extremes are told, ``orders`` those of their amplitudes. Meanings are those
-    of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure
-    their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
-    whole excitation periods, of so many mesh periods each.
+    The axes are those present of: second swept parameter, first swept parameter, realisation,
+    start, direction. ``states``: all states of the scene in its order; ``section``: states recorded
+    at the section points; ``contact`` and ``loads``: directions with contact and load outputs;
+    ``chosen``: states with extremes; ``orders``: orders of their amplitudes. Meanings belong to the
+    values 0, 1, ... of ``status``, of ``motion_changed`` (if lanes are computed twice to measure
+    their error), and of ``motion`` and ``record`` (if lanes are labelled). Periods are counted in
+    excitation periods, each of ``excitation_period`` mesh periods.
     """
     kept = section if section_points > 0 else ()
     parts: dict[Part, bool | Sequence[str]] = {

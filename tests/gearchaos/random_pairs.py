@@ -1,4 +1,4 @@
-"""Gear pairs drawn at random, and every scene there is."""
+"""Gear pairs drawn at random, and all scenes."""
 
 import itertools
 
@@ -42,10 +42,11 @@ BEARINGS = ((), ("transverse",), ("transverse", "axial"))
 
 
 def random_configuration(number: int, steps: int | None = None) -> str:
-    """Return the TOML of a helical pair with backlash at one speed, drawn by its number alone.
+    """Return the TOML of a helical pair with backlash at one speed; its number determines it.
 
-    Every third one has rigid bearings, soft ones in one direction, or in both. Speeds reach from
-    0.005 to 10 times the natural frequency; 12 periods from rest are recorded.
+    Bearings are in turn rigid, flexible in the transverse direction, and flexible in both. Mesh
+    frequencies range from 0.005 to 10 times the natural frequency. 12 periods from rest are
+    recorded.
     """
     rng = np.random.default_rng([29, number])
 

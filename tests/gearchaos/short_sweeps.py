@@ -1,4 +1,4 @@
-"""Sweeps of Pan 2021 short enough for a test, computed block by block and by hand."""
+"""Short sweeps, most of the pair of Pan 2021, computed in blocks or lane by lane."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.models import load_config
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
-"""The pair with the groups of the stored reference solutions, whose motions are well known."""
+"""The pair with the groups of the stored reference solutions; its motions are well known."""
 
 SPEEDS = PAN2021.with_name("mesh_frequency.toml")
 MASSES = PAN2021.with_name("two_masses.toml")
@@ -29,7 +29,7 @@ SOFT_BEARINGS = (
     "groups.transverse_damping_g=0.00148",
     "integration.transient_periods=4000",
 )
-"""A pair with many tori over its speeds, which are slow to settle."""
+"""A pair with tori at many speeds; its motions settle slowly."""
 SHORT = (
     "integration.steps_per_period=96",
     "integration.transient_periods=6",
@@ -61,7 +61,7 @@ amplitude_um = 8.0
 [scene]
 effects = ["pitch_error", "stiffness_variation", "backlash"]
 """
-"""A helical pair whose motions jump and double their period; without a sweep."""
+"""A helical pair whose motions jump and double their period; the text has no [sweep]."""
 
 METHODS = ("rk4", "flow_map")
 RANDOM = ("start.kind=random", "start.seed=5", "start.count=3", "start.spread=0.7")
@@ -72,12 +72,12 @@ def simulation(*overrides: str) -> RunPlan:
 
 
 def unlabelled(*overrides: str) -> RunPlan:
-    """Return a short sweep whose motions are not told, for which lanes are followed on and on."""
+    """Return a short sweep without labels of motions: no lane is computed beyond its record."""
     return simulation("outputs.motion=false", *overrides)
 
 
 def blocks(sweep: RunPlan, values: int) -> list[tuple[int, int]]:
-    """Return the bounds of blocks of as many lanes as so many swept values have."""
+    """Return the bounds of blocks, each with the lanes of the given number of swept values."""
     return blocks_of(sweep, values * sweep.lanes.repeats)
 
 
@@ -87,7 +87,7 @@ def computed(sweep: RunPlan, values: int = 13) -> dict[str, np.ndarray]:
 
 
 def computed_blocks(sweep: RunPlan, bounds: list, ends: EndStates | None = None) -> dict:
-    """Compute some blocks, a carried sweep from these end states on."""
+    """Compute some blocks; a carried sweep continues from the given end states."""
     kept: dict = {}
     with LocalExecutor(sweep, ends) as executor:
         compute_blocks(executor, bounds, kept.__setitem__)
@@ -112,7 +112,7 @@ def starts_of(sweep: RunPlan, first: int = 0, last: int | None = None) -> np.nda
 
 
 def kernel(sweep: RunPlan, lane: int, start: np.ndarray) -> np.ndarray:
-    """Integrate one lane of the sweep by hand and return its end state."""
+    """Integrate one lane of the sweep directly and return its end state."""
     system = sweep.lanes.system_of(np.array([lane]))
     return integrate(system, start[np.newaxis], sweep.plan).end_state[0]
 
@@ -123,7 +123,7 @@ def values_of(sweep: RunPlan) -> np.ndarray:
 
 
 def listing(folder: Path, parameter: str, values: list[float], *overrides: str) -> RunPlan:
-    """Sweep listed values of another parameter of the same pair."""
+    """Return a sweep of listed values of another parameter of the same pair."""
     head, tail = PAN2021.read_text().split("[sweep]")
     rest = tail[tail.index("[integration]") :]
     sweep = f'[sweep]\nparameter = "{parameter}"\nvalues = {values}\n'

@@ -1,4 +1,4 @@
-"""The accuracy command measures errors that are real, and recommends what it measured."""
+"""The accuracy command measures the true errors of settings, and recommends measured ones."""
 
 import re
 
@@ -16,7 +16,7 @@ from .short_sweeps import PAN2021
 from .test_contact_outputs import AXIAL
 
 PLAIN = tuple(word for one in AXIAL for word in ("--set", one))
-"""The scene whose plain steps other tests have compiled."""
+"""A scene for which other tests also compile plain steps."""
 SHORT = ("--set", "integration.transient_periods=150", "--steps", "50,100,200", "--lanes", "5")
 SHORT += PLAIN
 
@@ -118,7 +118,7 @@ def test_the_truth_is_that_of_the_stored_orbits():
     _, motion = pilot(sweep.lanes, sweep.plan, 2, TRUTH_STEPS)
     truth = motion(TRUTH_STEPS, True, "flow_map")
     for lane, orbit in enumerate(stored.values()):
-        # The mean over 150 periods is off by up to 1e-6.
+        # The mean over 150 periods has an error of up to 1e-6.
         assert truth.exponent[lane] == pytest.approx(orbit["largest_exponent"], abs=1e-6)
         expected = np.array([state[0] for state in orbit["section_points"]])
         apart = np.abs(truth.section[lane, :, :1] - expected)

@@ -1,4 +1,4 @@
-"""Lines of a spectrum are as high as the waves that they stand for."""
+"""Lines of a spectrum have the amplitudes of the waves in the signal."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_an_odd_number_of_samples_has_no_nyquist_line():
 
 @pytest.mark.parametrize("samples", [240, 225])
 def test_the_lines_hold_the_mean_square_of_the_motion(samples):
-    """Parseval: half of a square for every sine, the whole for mean and Nyquist line."""
+    """Parseval: half the squared amplitude of every sine, the whole of mean and Nyquist line."""
     values = np.random.default_rng(3).normal(1.0, 2.0, samples)
     amplitude = spectral_lines(values, samples // 15).amplitude
     shares = np.full(amplitude.size, 0.5)

@@ -1,4 +1,4 @@
-"""The Python blocks of README.md and of pages in docs/ run as they stand, one after the other."""
+"""The Python blocks of README.md and of pages in docs/ run unchanged, one after the other."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ CLONE = Path(__file__).resolve().parents[2]
 
 
 def run_blocks(page: str, folder: Path, names: dict) -> None:
-    """Run the blocks of a page in a folder that looks like the clone."""
+    """Run the blocks of a page in a folder that contains the sweeps of the clone."""
     (folder / "sweeps").symlink_to(CLONE / "sweeps")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

@@ -1,4 +1,4 @@
-"""From a dict with arrays to arrays, several replacements at once, and messages as log records."""
+"""A dict with arrays is run, several keys are replaced at once, and messages are log records."""
 
 import logging
 import re
@@ -16,7 +16,7 @@ SPEEDS = np.linspace(0.5, 0.51, 3)
 
 
 def tables() -> dict:
-    """Return the tiny sweep as a user writes it in Python, with arrays and numbers of NumPy."""
+    """Return the tiny sweep as a user writes it in Python, with NumPy arrays and numbers."""
     return {
         "title": "a spur pair",
         "groups": {
@@ -71,7 +71,7 @@ def test_wrong_tables_are_a_gearchaos_error(wrong):
 
 def test_several_keys_are_replaced_at_once_and_checked_together():
     config = gearchaos.Configuration.from_toml(TINY)
-    # One by one they would break a rule.
+    # Replaced one by one, these keys would break a rule.
     lists = {"sweep.from": None, "sweep.to": None, "sweep.count": None, "sweep.values": SPEEDS}
     assert config.replace(lists).sweep.values == tuple(SPEEDS.tolist())
     changed = config.replace({"sweep.parameter": "load", "sweep.from": 0.1, "sweep.to": 0.2})
@@ -105,11 +105,11 @@ def test_a_log_has_all_messages_with_time_and_level(tmp_path):
 
 
 def test_messages_are_records_of_the_standard_logging(caplog, capsys, monkeypatch):
-    # Another package of this process may have silenced all loggers that existed then.
+    # Another package in this process may have disabled all existing loggers.
     monkeypatch.setattr(logging.getLogger("gearchaos"), "disabled", False)
     monkeypatch.setattr(logging.getLogger("gearchaos"), "propagate", True)
     with caplog.at_level(logging.INFO, "gearchaos"):
         complain("a warning")
     assert ("gearchaos", logging.WARNING, "a warning") in caplog.record_tuples
-    # Without a handler nothing is printed twice.
+    # Without a handler, the message is printed only once.
     assert capsys.readouterr().err.count("a warning") == 1

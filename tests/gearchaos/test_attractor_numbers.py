@@ -1,4 +1,4 @@
-"""Numbers that stay with an attractor along a sweep."""
+"""An attractor keeps its number along a sweep."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from gearchaos.dynamics.attractors import numbers_along
 
 
 def at(*points: float) -> np.ndarray:
-    """An orbit with these values of two states of different size: its mean and extent."""
+    """Return mean and extent of an orbit with these values, for two states of different size."""
     values = np.array(points)
     both = np.stack([values, 1e-3 * values], axis=1)
     return np.stack([both.mean(axis=0), both.std(axis=0)])
 
 
 def numbered(*sets: list[np.ndarray]) -> list[list[int]]:
-    """Numbers of the attractors of each value, the first of which has the largest basin."""
+    """Return the numbers of the attractors at each value; the first has the largest basin."""
     value = np.repeat(np.arange(len(sets)), [len(found) for found in sets])
     sizes = np.concatenate([-np.arange(len(found)) for found in sets])
     averages = np.array([one for found in sets for one in found]).reshape(-1, 2, 2)
@@ -22,7 +22,7 @@ def numbered(*sets: list[np.ndarray]) -> list[list[int]]:
 
 
 LOW, HIGH = [at(3.0 + 0.4 * n) for n in range(5)], [at(9.0 - 0.4 * n) for n in range(6)]
-"""Two orbits at five values, which move with the parameter."""
+"""Two orbits that move with the parameter, at five and at six values."""
 
 
 def test_what_goes_on_keeps_its_number_and_what_is_new_gets_the_next():

@@ -1,4 +1,4 @@
-"""Attractors found from where lanes have come to, whatever their phase."""
+"""Attractors are found from the end states of lanes, for any phase of the motion."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def found_from(multiples, states, motion, period, group=0):
 
 
 def ends(multiple, count, periods):
-    """Where lanes from different starts are after so many mesh periods."""
+    """Return the states of lanes from different starts after the given number of mesh periods."""
     start = np.zeros((count, 6))
     start[:, 0] = np.linspace(0.9, 1.1, count)
     system = system_of(pan2021(np.full(count, multiple)), NO_AXIAL)
@@ -74,7 +74,7 @@ def test_starts_on_one_chaotic_attractor_are_reported_by_where_it_goes():
 
 
 def test_averages_that_differ_by_an_extent_are_those_of_two_attractors():
-    """Lanes of two pitch errors, as if both were of one: their averages differ by 0.9 extents."""
+    """Two lanes of different pitch errors form one group; their averages differ by 0.9 extents."""
     multiples = [13.0, 12.5]
     states = np.concatenate([ends(multiple, 1, 300) for multiple in multiples])
     found, number = found_from(multiples, states, CHAOTIC, 0)

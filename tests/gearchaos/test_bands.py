@@ -1,4 +1,4 @@
-"""Every n-th point of a torus goes everywhere; of a doubled or tripled orbit it does not."""
+"""Subsequences of every n-th point cover a whole torus, but not a doubled or tripled orbit."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 def torus(rotation: float, curves: int = 1, points: int = POINTS) -> np.ndarray:
-    """Points that visit so many ellipses in turn, each with this rotation number."""
+    """Return points that visit ``curves`` ellipses in turn, each with this rotation number."""
     number = np.arange(points)
     angle = 2.0 * np.pi * rotation * (number // curves)
     centre = 5.0 * np.cos(2.0 * np.pi * number / curves)
@@ -20,7 +20,7 @@ def torus(rotation: float, curves: int = 1, points: int = POINTS) -> np.ndarray:
 
 
 def logistic(r: float, points: int = POINTS) -> np.ndarray:
-    """Points of the logistic map after a long transient."""
+    """Return points of the logistic map after a long transient."""
     x = 0.4
     for _ in range(100_000):
         x = r * x * (1.0 - x)
@@ -68,7 +68,7 @@ def test_a_long_period_of_small_factors_is_not_a_torus(period):
 def test_too_few_points_report_nothing():
     assert apart(torus(GOLDEN, points=111)) == np.inf
     assert apart(torus(GOLDEN, points=112)) < np.inf
-    # Sixteen curves take more points than these.
+    # Sixteen curves need more than 500 points.
     assert apart(torus(GOLDEN, LONGEST_PERIOD, points=500)) > apart(torus(GOLDEN, LONGEST_PERIOD))
 
 
@@ -97,7 +97,7 @@ def test_the_bands_of_the_logistic_map_merge_where_they_are_known_to(r, count):
 @pytest.mark.parametrize("rotation", [GOLDEN, 0.01 * GOLDEN, np.pi / 10.0, 0.25 + 0.004 * GOLDEN])
 def test_every_curve_of_a_torus_is_a_band(rotation, curves):
     section = torus(rotation, curves)
-    # Some of these curves lie on top of each other but for one coordinate.
+    # Without the added coordinate, some of these curves would lie on top of each other.
     apart = np.sin(2.0 * np.pi * np.arange(POINTS) / curves)
     assert bands(np.insert(section, 1, 5.0 * apart, axis=1)) == curves
 
@@ -119,4 +119,4 @@ def test_noise_a_point_at_rest_and_too_few_points_are_one_band():
 
 
 def test_more_bands_than_are_counted_are_reported_as_a_divisor():
-    assert bands(logistic(3.5701, 512)) == 16  # There are 32.
+    assert bands(logistic(3.5701, 512)) == 16  # The map has 32 bands.

@@ -12,7 +12,7 @@ def test_where_there_is_one_attractor_nothing_is_uncertain():
 
 @pytest.mark.parametrize("column", [1, 2, 3, 4])
 def test_a_straight_boundary_cuts_one_column_of_boxes(column):
-    """Of eight columns of boxes the fifth holds both attractors, in the shares k/5 and 1 - k/5."""
+    """The fifth of eight columns of boxes holds both attractors, with shares k/5 and 1 - k/5."""
     side = np.arange(40) < 20 + column
     share = column / 5.0
     boundary = -share * np.log(share) - (1.0 - share) * np.log(1.0 - share)
@@ -28,7 +28,8 @@ def test_a_boundary_between_the_boxes_is_not_seen():
 def test_random_attractors_have_the_logarithm_of_their_number(attractors):
     drawn = np.random.default_rng(3).integers(attractors, size=(400, 400))
     whole, boundary = basin_entropy(drawn, box=20)
-    # From 400 draws it is lower by half a chi-square of freedom attractors - 1 (Miller 1955).
+    # The entropy of 400 draws is lower by chi-square / 800, with the degrees of freedom
+    # attractors - 1 (Miller 1955).
     freedom = attractors - 1.0
     error = np.sqrt(2.0 * freedom) / 800.0 / np.sqrt(400.0)
     assert whole == pytest.approx(np.log(attractors) - freedom / 800.0, abs=4.0 * error)

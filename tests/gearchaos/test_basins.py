@@ -1,4 +1,4 @@
-"""Basins of the two motions of period 1 that coexist in Pan 2021, and the command that tells."""
+"""Basins of the two coexisting motions of period 1 in Pan 2021, and the basins command."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ from .commands import run_module
 from .short_sweeps import PAN2021
 
 BETWEEN_THEM = 0.95
-"""At P = 1.04 the motion that never parts passes delta_5 = 1.24, the other one 0.66."""
+"""At P = 1.04 the motion without contact loss has delta_5 = 1.24 in the section, the other 0.66."""
 
 SHORT = ("integration.transient_periods=200", "integration.recorded_periods=48")
 
@@ -35,14 +35,14 @@ def computed(values: list[float], *start: str) -> Result:
 
 @pytest.fixture(scope="module")
 def grid() -> Result:
-    # Without bearings, as in the notebook: this loop is compiled for both of them.
+    # Without bearings, as in the notebook: both use the same compiled loop.
     scene = 'scene.effects=["pitch_error", "stiffness_variation", "backlash"]'
     return computed([1.04], scene, "start.kind=grid", "start.count=11", "outputs.contact=true")
 
 
 @pytest.fixture(scope="module")
 def several() -> Result:
-    """Values before, between and beyond the two folds at 0.780 and 1.691."""
+    """Compute a sweep at values before, between and beyond the two folds at 0.780 and 1.691."""
     values = [0.7, 0.9, 1.2, 1.6, 1.8]
     return computed(values, "start.kind=random", "start.count=16", "start.seed=2")
 
@@ -91,7 +91,7 @@ def test_two_motions_share_the_starts_as_a_plain_count_does(grid):
 
 
 def test_a_start_at_rest_changes_sides_where_the_pair_hops():
-    """Of pan2021_first.toml the hop of a start at rest lies at 1.044."""
+    """In pan2021_first.toml, a start at rest hops from one motion to the other at 1.044."""
     found = find_basins(computed([1.04, 1.05], "start.kind=grid", "start.count=3"))
     at_rest = [len(found.grid["delta_5"]) ** 2 // 2]
     sections = {(one.value, one.number): one.section for one in found.basins}

@@ -1,4 +1,4 @@
-"""Finished blocks survive whatever ends a sweep, are verified, and become one file."""
+"""Finished blocks survive any end of a sweep, are verified, and are merged into one file."""
 
 import errno
 import json
@@ -466,7 +466,7 @@ def test_shards_share_the_folder_and_a_whole_sweep_does_not(output: Path) -> Non
         assert (one.own_lanes, other.own_lanes) == (60, 40)
         assert read_manifest(one.folder)["shards"] == 2
         assert other.finished() == ([], [])
-        # Who does the same work twice writes the same bits.
+        # A second process with the same work writes the same bits.
         before = sorted((path.name, path.read_bytes()) for path in one.folder.glob("*.block"))
         fill(same, HALVES[0])
         assert before == sorted((p.name, p.read_bytes()) for p in one.folder.glob("*.block"))
@@ -537,7 +537,7 @@ def test_a_folder_that_is_a_link_or_of_another_user_is_refused(output: Path) -> 
     try:
         os.chown(folder, 12_345, -1)
     except PermissionError:
-        pytest.skip("only root can give a folder away")
+        pytest.skip("only root can change the owner of a folder")
     with pytest.raises(FileError, match=r"blocks: is a link or not your folder"):
         open_store(output)
     assert list(folder.iterdir()) == []

@@ -1,4 +1,4 @@
-"""A sweep up and down in one file: where its directions differ, and the folds between which."""
+"""A sweep up and down in one file: its directions differ between two folds."""
 
 import json
 
@@ -46,7 +46,7 @@ def result(folder):
 
 @pytest.fixture(scope="module")
 def folds():
-    """Where System.follow finds the ends of the two coexisting motions of period 1."""
+    """Return the values at which System.follow ends the two coexisting motions of period 1."""
     ends = []
     for first, last, contact in ((1.5, 0.5, False), (1.0, 2.0, True)):
         system = gearchaos.System(PAN2021, pitch_error=first)
@@ -103,7 +103,8 @@ def test_a_direction_whose_motion_continues_does_not_jump():
     result = gearchaos.run(gearchaos.load_config(MASSES, [sweep]))
     stretches = apart(result)
     assert stretches
-    # Upwards the motion of period 6 continues to 0.5917; downwards it changes to period 7 before.
+    # Upwards, the motion of period 6 continues from 0.5875 to 0.5917. Downwards, it changes to
+    # period 7 between these values.
     for jump in refined_jumps(computable(result, "masses.h5"), result, stretches, 1e-6):
         stays = jump.loss.startswith("the orbit stays stable")
         assert not (stays and jump.label_below == jump.label_above), jump

@@ -20,9 +20,9 @@ CURVE = Curve(None, 0, Plan(12, 0, 1, 1, method="flow_map"), 1, np.ones(1))
 def cubic_curve(bend, touches=False, gap=0.0):
     """Return the defects of the map x + share - 0.5 - x^3 + bend x, of one state.
 
-    Its orbits lie at the share 0.5 + x^3 - bend x, with the multiplier 1 - 3 x^2 + bend. If it
-    touches, an impact on the driving flank appears where x passes 0. No orbit is closer to 0
-    than half the gap.
+    Its orbits lie at the share 0.5 + x^3 - bend x, with the multiplier 1 - 3 x^2 + bend. With
+    ``touches``, an impact on the driving flank appears where x passes 0. No orbit is closer to
+    x = 0 than half of ``gap``.
     """
 
     def defects(requests):
@@ -45,7 +45,7 @@ def cubic_curve(bend, touches=False, gap=0.0):
 
 
 def points_at(bend, states):
-    """Search the points of the cubic curve at states."""
+    """Search for the points of the cubic curve near these states."""
     points = []
     for x in states:
         place = np.array([x, 0.5 + x**3 - bend * x])
@@ -55,7 +55,7 @@ def points_at(bend, states):
 
 
 def special_points(bend, states):
-    """Return the special points that are found on the cubic curve from its points at states."""
+    """Return the special points found between the points of the cubic curve at these states."""
 
     def search():
         points = yield from points_at(bend, states)

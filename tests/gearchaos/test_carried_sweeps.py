@@ -1,4 +1,4 @@
-"""Sweeps whose lanes start where their neighbours ended, and lanes that hand nothing on."""
+"""Sweeps whose lanes start from the end states of their neighbours, and diverged lanes."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, over
     whole = computed(sweep)
     for values in (1, 4):
         assert_same(computed(sweep, values), whole)
-    # Blocks may end between lanes that are side by side.
+    # Blocks may end between lanes that are computed side by side.
     odd = computed_blocks(sweep, blocks_of(sweep, sweep.lanes.side_by_side + 1))
     assert_same(joined(sweep, odd), whole)
 
@@ -100,7 +100,7 @@ def test_sweeping_up_and_down_differ_where_two_motions_coexist():
     assert not apart[(values < 0.6) | (values > 2.0)].any()
 
 
-# A load that drives the first lane of the way beyond every length scale.
+# The load makes the first lane in the direction of the sweep diverge.
 FIRST_DIVERGES = {
     "upwards": ("load", [-1e150, 0.2, 0.3]),
     "downwards": ("load", [0.2, 0.3, 1e150]),
@@ -135,7 +135,7 @@ def test_a_lane_that_diverged_has_a_status_a_period_and_no_numbers(tmp_path):
 
 
 def test_exponent_of_a_swept_mesh_frequency_is_per_unit_of_time(tmp_path):
-    # Bearings and mesh decay at their own pace whatever the period of the forcing.
+    # The rate of decay does not depend on the period of the forcing.
     frequencies = [0.4, 0.8, 1.6]
     sweep = listing(
         tmp_path,

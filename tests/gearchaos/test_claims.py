@@ -1,4 +1,4 @@
-"""What is claimed of an error bounds it: transients, modes that a step damps, and rounding."""
+"""Claimed errors bound the true ones: transients, modes damped by the step, and rounding."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ SLOW = (
     "integration.recorded_periods=100",
     "outputs.section_points=4",
 )
-"""Soft, weakly damped bearings: a disturbance takes some 35 mesh periods to fall by a factor e."""
+"""Soft, weakly damped bearings: a disturbance falls by a factor e in about 35 mesh periods."""
 
 STIFF = (
     "groups.mass_ratio_p=0.7",
@@ -50,11 +50,11 @@ STIFF = (
     "integration.transient_periods=300",
     "integration.recorded_periods=100",
 )
-"""Stiff bearings, of which the weakly damped ones decide the exponent, and low mesh frequencies."""
+"""Stiff bearings at low mesh frequencies; the weakly damped bearings determine the exponent."""
 
 
 def true_section_error(sweep, arrays, name: str = "delta_5", periods: int = 6000) -> np.ndarray:
-    """Distance of the last section point from where flow maps come to after a long time."""
+    """Return the distance of the last section point from the orbit that flow maps reach later."""
     every = np.arange(len(sweep.lanes))
     system = sweep.lanes.system_of(every)
     much_later = integrate(
@@ -74,7 +74,7 @@ def slow():
 def test_a_section_on_its_way_is_claimed_to_be_as_far_off_as_it_is(slow):
     true, claimed = true_section_error(*slow), slow[1]["section_error"]
     assert (true > 1e-6).all()
-    # The claim is the largest one of the last period, which has one point.
+    # The claim is the largest distance in the last period, which has one point.
     assert claimed == pytest.approx(true, rel=0.01)
     assert (slow[1]["motion_changed"] == SAME).all()
 
@@ -93,7 +93,7 @@ def test_points_kept_from_earlier_are_further_off(slow):
 
 
 def test_a_lane_labelled_by_a_longer_record_is_claimed_to_be_off_by_what_its_own_lacks():
-    # Just above a period doubling: after 200 periods the orbit is told by the second look.
+    # Just below a period doubling: after 200 periods, only a longer record labels the orbit.
     sweep = simulation(
         *("sweep={parameter='pitch_error', values=[5.0, 10.26610169]}", *MAPS, CHECKED),
         *("integration.transient_periods=100", "integration.recorded_periods=100"),
@@ -118,7 +118,7 @@ def test_a_tolerance_is_kept_behind_a_longer_transient():
     true = true_section_error(sweep, computed(sweep))
     assert (true < 1e-8).all()
     claimed = float(sweep.notes[-1].split("section is off by ")[1].split(",")[0])
-    # Printed with two digits.
+    # The note has two digits.
     assert 0.9 * true.max() < claimed < 1e-8
 
 
@@ -174,7 +174,7 @@ def linear_pair(**groups):
 
 
 def linear_orbit(system) -> np.ndarray:
-    """The fixed point of the affine map of one period, in closed form."""
+    """Return the fixed point of the affine map of one period, in closed form."""
     once = Plan(24, 0, 1, 1, tangent=True, method="flow_map")
     states = len(system.states)
     columns = [
@@ -238,7 +238,7 @@ def test_no_claim_is_below_the_rounding_of_flow_maps(steps):
     assert (found.section_rounding < 1e-11).all()
     modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     error = np.abs(solution.exponent - np.max(modes.real, axis=1))
-    # Twice: eigenvalues of a nearly symmetric pair of modes are less well conditioned.
+    # Factor 2: eigenvalues of a nearly symmetric pair of modes are less well conditioned.
     assert (error <= 2.0 * found.exponent_rounding).all()
     assert (found.exponent_rounding < 1e-12).all()
 
@@ -282,7 +282,8 @@ def test_modes_that_half_the_step_damps_are_hidden_until_steps_are_fine():
     limit = int(fewest_stable_steps(system)[0])
     assert hidden_decay(system, limit, "rk4") == pytest.approx(np.full(2, stiffest.real))
     assert np.isneginf(hidden_decay(system, 40 * limit, "rk4")).all()
-    # Both sides of the limit of five per cent, from the leading error |h lambda|^6 / 144 a step.
+    # Steps on both sides of the limit of five per cent, which follows from the leading error
+    # |h lambda|^6 / 144 per step.
     step = (0.05 * 144.0 * abs(stiffest.real) / abs(stiffest) ** 6) ** 0.2
     steps = 0.5 * PERIOD / step
     assert np.isfinite(hidden_decay(system, int(0.9 * steps), "rk4")).all()
@@ -307,7 +308,7 @@ def test_a_hidden_mode_gives_the_error_with_and_without_flow_maps(teeth):
     found = hidden_error(system, plan, period, orbits.points, exponent)
     assert (true > 0.01).all()
     assert found == pytest.approx(true, rel=1e-9)
-    # Flow maps have no step that damps, and what moves otherwise no orbit.
+    # A step of a flow map does not damp; a motion that is not periodic has no orbit.
     exact = plan._replace(method="flow_map")
     assert not hidden_error(system, exact, period, orbits.points, exponent).any()
     assert not hidden_error(system, plan, 0 * period, orbits.points, exponent).any()
@@ -343,7 +344,7 @@ def test_lanes_that_move_in_another_way_are_no_part_of_the_errors():
 
 
 def test_the_summary_names_a_section_that_begins_far_from_its_orbit():
-    # Of period 2, the first points a little off; one lane has no period.
+    # Two lanes of period 2, the first points a little off the orbit; one lane without a period.
     section = np.array([[0.5, 1.0, 2.0, 1.0, 2.0], [2.0 - 6e-6, 1.0, 2.0, 1.0, 2.0], [0.0] * 5])
     arrays = {
         "status": np.zeros(3),

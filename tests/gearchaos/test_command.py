@@ -1,4 +1,4 @@
-"""The console script: one name for all commands."""
+"""The console script runs all commands under one name."""
 
 import shutil
 import signal
@@ -75,7 +75,7 @@ def test_an_interrupt_while_a_command_is_imported_ends_it_without_a_traceback(tm
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        # Each module is told once it has been imported.
+        # Python prints the name of each module after its import.
         while not process.stderr.readline().endswith(" gearchaos\n"):
             assert process.poll() is None
         process.send_signal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""The process that runs commands for the tests: a test that fails leaves the others theirs."""
+"""The process that runs commands for the tests: a failed test does not affect other tests."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ import pytest
 from .commands import _server, begin, is_running, run_module
 
 FOREVER = ("-n", "1", "-r", "1", "import time; time.sleep(10_000)")
-"""Arguments of timeit that take longer than anybody waits."""
+"""Arguments of timeit that take longer than any test waits."""
 
 
 def test_a_command_that_nobody_waited_for_is_killed_and_the_next_gets_its_own_code(tmp_path):
@@ -28,7 +28,7 @@ def test_commands_beside_each_other_have_their_own_codes_and_end_with_the_next(t
     assert is_running(process)
     assert (other().code, one().code) == (0, 4)
     assert run_module("gearchaos.sweep", "--version", cwd=tmp_path).code == 0
-    while is_running(process):  # It is killed, and somebody else has to notice.
+    while is_running(process):  # It is killed, but its parent has yet to collect its exit code.
         time.sleep(0.005)
 
 

@@ -12,7 +12,7 @@ SWEEP_OPTIONS = {"--resume", "--dry-run", "--set", "--output", "--threads", "--s
 
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
-    """Return a function that gives what bash offers after some words, in a folder of two files."""
+    """Return a function that lists the completions of bash in a folder with two files."""
     if shutil.which("bash") is None:
         pytest.skip("there is no bash")
     folder = tmp_path_factory.mktemp("completion")

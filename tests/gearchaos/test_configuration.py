@@ -1,4 +1,4 @@
-"""What a configuration file becomes: tables, swept values, groups of the lanes, TOML again."""
+"""A configuration file becomes tables, swept values and groups of the lanes, and TOML again."""
 
 import json
 import math
@@ -31,7 +31,7 @@ KEY_TABLES = key_tables(GearPairConfiguration)
 
 
 def lane_groups(config):
-    """Swept values and groups of a sweep of one parameter."""
+    """Return swept values and groups of a sweep of one parameter."""
     values = swept_values(config.sweep)
     return values, groups_at(config, {config.sweep.parameter: values})
 
@@ -275,7 +275,7 @@ def test_a_parameter_fixed_at_a_value_leaves_its_sweep():
     along = config.at({"pitch_error": 10.75})
     assert list(along.sweeps.items()) == [("sweep", config.second_sweep)]
     assert along.groups.given()["pitch_error"] == 10.75
-    # What is not swept is fixed as well.
+    # A parameter that is not swept can be fixed, too.
     assert config.at({"damping_ratio": 0.02}).sweeps == config.sweeps
     assert groups_at(config.at({"damping_ratio": 0.02}), {}).damping_ratio == 0.02
     physical = Configuration.from_toml(PHYSICAL).at({"operation.speed_rpm": 3000.0})

@@ -1,4 +1,4 @@
-"""Every fault of a configuration gives one clear message, all of them at once."""
+"""Every fault of a configuration has one clear message; all faults are reported at once."""
 
 import datetime
 import re
@@ -234,7 +234,7 @@ ONE_FAULT = [
     (
         'second_sweep={parameter="pitch_error", values=[1, 2]}',
         'second_sweep.parameter = "pitch_error"',
-        "what [sweep] sweeps already",
+        "already swept by [sweep]",
         "drop [second_sweep]",
     ),
     (

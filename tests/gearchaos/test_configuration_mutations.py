@@ -1,4 +1,4 @@
-"""Whatever a configuration says, it is either sound or refused in words."""
+"""Any configuration is either sound or refused with a message."""
 
 import copy
 import datetime

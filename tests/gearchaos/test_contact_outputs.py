@@ -1,4 +1,4 @@
-"""The contact of a lane in a result: names, states in words, and when it can be reported."""
+"""Contact outputs of a lane: names, states in words, and when they can be reported."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ ASKED = (
     *("outputs.contact=true", "outputs.loads=true"),
     *("integration.transient_periods=60", "sweep.count=6", *AXIAL),
 )
-"""Contact and loads together, which other tests ask for, too: a loop is compiled for both."""
+"""Contact and loads together, as in other tests: all use the same compiled loop."""
 
 
 def test_the_four_states_of_contact():
@@ -68,7 +68,7 @@ def test_a_sweep_reports_the_contact_of_both_directions_and_its_file_keeps_it(tm
     crossed = result["crossings_per_period"]
     ways = [f"impacts_{flank}_{way}" for flank in ("driving", "back") for way in WAYS]
     impacts = sum(result[name] for name in ways)
-    # Every impact is followed by a departure, but for one of each direction at the very end.
+    # A departure follows every impact, except for one impact per direction at the very end.
     most = len(WAYS) / config.integration.recorded_periods
     assert np.abs(crossed - 2.0 * impacts).max() <= most + 1e-12
     settings = [f"--set={one}" for one in (*SHORT, *ASKED)]

@@ -1,4 +1,4 @@
-"""Control of periodic orbits: its linear design, what it captures, and the command."""
+"""Control of periodic orbits: linear design, captured starts, and the command."""
 
 import json
 from functools import cache
@@ -22,8 +22,8 @@ from .commands import SMALL, run_module
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 PUBLISHED = {0.05: (0.915, 347), 0.1: (1.0, 164), 0.2: (1.0, 144), 0.3: (1.0, 140)}
-"""Share of 1000 chaotic starts that each limit captured in an independent computation, and the
-median time in mesh periods."""
+"""Share of 1000 chaotic starts that were captured with each limit in an independent computation,
+and the median time until capture in mesh periods."""
 
 
 TEETH = """
@@ -123,7 +123,7 @@ def test_delayed_feedback_has_the_multipliers_with_which_deviations_grow(weight)
     largest = np.abs(found.closed_multipliers[0])
     assert largest > 1.0
     assert found.closed_multipliers.shape == (6,)
-    # A complex pair turns while it grows.
+    # With a complex pair of multipliers, the deviation turns while it grows.
     rates = np.diff(np.log(motion.distance[0, 10:41]))
     assert np.exp(rates.mean()) == pytest.approx(largest, rel=0.02)
 
@@ -157,7 +157,7 @@ def test_the_riccati_equation_is_solved_where_multipliers_are_large_or_tiny(stat
     random = np.random.default_rng(states)
     a, b = random.normal(size=(states, states)) / np.sqrt(states), np.eye(states)[:, :2]
     for factor in (1e-12, 0.3, 1.4):
-        # Some modes decay within a period, as they do over the mesh periods of a long orbit.
+        # Some modes decay within a period, as on a long orbit of many mesh periods.
         matrix = factor * a @ np.diag(np.logspace(0, -12, states))
         found = riccati(matrix, b, np.eye(states), 3.0 * np.eye(2))
         gain = np.linalg.solve(3.0 * np.eye(2) + b.T @ found @ b, b.T @ found @ matrix)
@@ -171,14 +171,14 @@ def test_the_riccati_equation_is_solved_where_multipliers_are_large_or_tiny(stat
 @pytest.mark.parametrize("limit", PUBLISHED)
 def test_chaotic_starts_are_captured_as_often_and_as_fast_as_known(limit):
     found = controller(limit=limit)
-    # Captured there is a motion whose states are all within 1e-6 of the orbit.
+    # In the independent computation, all states of a captured motion are within 1e-6 of the orbit.
     motion = found.run(1000, 1000)._replace(within=1e-6 / found.scales.max())
     share, median = PUBLISHED[limit]
     counts = np.array([[motion.captured.sum(), 1000 * share], [0, 0]], dtype=int)
     counts[1] = 1000 - counts[0]
     assert scipy.stats.fisher_exact(counts).pvalue > 0.003
     times = np.sort(motion.capture_time[motion.captured])
-    # Both medians vary: 95 % of medians lie between the order statistics n/2 -+ sqrt(n).
+    # Both medians are random: 95 % of medians lie between the order statistics n/2 -+ sqrt(n).
     reach = int(1.5 * np.sqrt(2.0 * times.size))
     middle = times.size // 2
     assert times[middle - reach] <= median <= times[middle + reach]
@@ -187,12 +187,13 @@ def test_chaotic_starts_are_captured_as_often_and_as_fast_as_known(limit):
 
 
 def test_a_motion_that_noise_puts_near_the_orbit_by_chance_is_not_captured():
-    # With this limit the controller changes nothing, and 30 deviations reach over all of chaos.
+    # With this limit the controller has no effect. The reach of 30 standard deviations of the
+    # noise covers the whole chaotic motion.
     motion = controller(noise=0.05, limit=1e-4).run(60, 400)
     near = motion.distance <= motion.within
     assert near[:, -1].any() and not motion.captured.any()
     assert (motion.capture_time == -1).all()
-    # One period away from the orbit in the last sixteen, or without input, is enough.
+    # One of the last sixteen periods away from the orbit, or without input, prevents a capture.
     on = motion._replace(distance=np.zeros((3, 40)), inputs=np.ones((3, 40)))
     on.distance[0, -16], on.inputs[1, -16], on.distance[2, -17] = 1.0 + on.within, 0.0, 2.0
     assert on.captured.tolist() == [False, False, True]

@@ -1,4 +1,4 @@
-"""Control of machines: two masses and a stop by a force, trains by a torque, with both methods."""
+"""Control of two masses with a stop by a force and of trains by a torque, with every method."""
 
 import json
 from functools import cache
@@ -20,7 +20,7 @@ PLANETARY = MASSES.with_name("planetary.toml")
 STEPS = {"flow_map": 16, "rk4": 400, "taylor": 4}
 METHODS = tuple(STEPS)
 DOUBLED = {"x1": 0.388, "x1_rate": 0.606, "x2": 0.4207, "x2_rate": 1.0617}
-"""A state near the stable orbit of period 2 at the frequency 0.74, where the period is doubled."""
+"""A state near the stable orbit of period 2 at the frequency 0.74."""
 
 TRAIN = """
 title = "one stage"
@@ -64,7 +64,7 @@ motion = false
 
 
 def masses(method, **changes):
-    """Return the two masses with a method; a name has __ in place of a dot."""
+    """Return the two masses with a method and changes; a key has __ in place of a dot."""
     config = gearchaos.load_config(MASSES).replace("start", {"kind": "rest"})
     config = config.replace("integration", {"method": method, "steps_per_period": STEPS[method]})
     return config.replace({key.replace("__", "."): value for key, value in changes.items()})
@@ -72,7 +72,7 @@ def masses(method, **changes):
 
 @cache
 def beyond_doubling(method):
-    """Return the masses at 0.74, and their unstable orbit of period 1."""
+    """Return the masses at the frequency 0.74, and their unstable orbit of period 1."""
     system = gearchaos.System(
         masses(method, start={"kind": "given", "state": DOUBLED}), frequency=0.74
     )
@@ -81,7 +81,7 @@ def beyond_doubling(method):
 
 @cache
 def beyond_neimark_sacker(method):
-    """Return the masses at 0.616, and their orbit with two unstable multipliers."""
+    """Return the masses at the frequency 0.616, and their orbit with two unstable multipliers."""
     config, guess = masses(method), None
     for frequency in np.linspace(0.64, 0.616, 13):
         system = gearchaos.System(config, frequency=float(frequency))
@@ -115,7 +115,7 @@ def test_the_frame_of_the_closed_loop_has_the_designed_multipliers(case, method)
         found = Controller(*case(method), ControlSettings(gain, limit_absolute=0.05))
         assert np.sum(np.abs(found.multipliers) > 1.0) == unstable
         assert np.abs(found.closed_multipliers[0]) < 1.0
-        # Twice the multiplier 0 is defective: rounding of 1e-16 moves both by 1e-8.
+        # A double multiplier 0 is defective: rounding of 1e-16 moves both by 1e-8.
         expected, close = found.maps.closed(found.gain), 1e-8
         np.testing.assert_allclose(closed_frame(found), expected, atol=close)
         moved = np.sort_complex(np.linalg.eigvals(closed_frame(found)))
@@ -144,7 +144,7 @@ def test_a_doubled_motion_returns_to_the_orbit_of_period_1(method):
     assert found.load == 0.0
     assert found.unit == (1.0, "force")
     begin = found.starts(4)
-    # Two excitation periods later the motion is the same, one later it is another one.
+    # The motion repeats after two excitation periods, and not after one.
     after = system.equations.of(np.zeros(4, dtype=int))
     section = integrate(after, begin, Plan(STEPS[method], 0, 2, 2, True, method=method)).section
     np.testing.assert_allclose(section[:, 1], begin, atol=1e-6)
@@ -170,7 +170,7 @@ def test_the_motion_beyond_neimark_sacker_returns_to_an_orbit_with_two_unstable_
 
 
 def test_a_sweep_of_machines_is_controlled_and_drawn(tmp_path):
-    """The orbit of 0.74 ends in a fold at 0.7556."""
+    """The orbit that is found at 0.74 ends in a fold at 0.7556."""
     config = masses(
         "flow_map",
         start={"kind": "given", "state": DOUBLED},
@@ -192,7 +192,7 @@ def test_a_sweep_of_machines_is_controlled_and_drawn(tmp_path):
     assert (effort[0] == 0.0).all()
     assert (effort[1, :2] > 0.0).all()
     assert (effort <= 0.05).all()
-    # The force has no steady part, of which the input could be a share.
+    # The force has no steady part, so the input cannot be given as a share of it.
     assert np.isnan(result["effort_largest"]).all()
     done = run_module("gearchaos.plot", "masses.h5", "--control", "-o", "masses.png", cwd=tmp_path)
     assert done.code == 0, done.err
@@ -236,7 +236,7 @@ def test_the_torque_of_a_shaft_is_changed_in_newton_metres():
 
 
 def train(speed):
-    """Return the stage at a speed, its orbit, and a controller of it."""
+    """Return a controller of the orbit of the stage at a speed."""
     config = gearchaos.Configuration.from_toml(TRAIN).without_control()
     system = gearchaos.System(config, {"operation.speed_rpm": speed})
     return Controller(system, system.orbit(), ControlSettings(limit_absolute=6.0))
@@ -252,7 +252,7 @@ def planetary():
 
 @pytest.mark.slow
 def test_an_orbit_of_many_states_closes_to_rounding():
-    """Displacements of 50 leave errors of 1e-12 in the smallest rates."""
+    """Displacements of 50 cause rounding errors of 1e-12 in the smallest rates."""
     orbit = planetary().orbit
     assert orbit.point.size == 34
     assert orbit.stable
@@ -267,7 +267,7 @@ def test_the_frame_of_a_controlled_train_has_the_designed_multipliers(controller
     np.testing.assert_allclose(frame, found.maps.closed(found.gain), atol=1e-8)
     moved = np.sort(np.abs(np.linalg.eigvals(frame)))
     np.testing.assert_allclose(moved, np.sort(np.abs(found.closed_multipliers)), atol=1e-8)
-    # The orbit is stable without control; with it, the motion returns faster.
+    # The orbit is stable without control; with control, the motion returns faster.
     assert np.abs(found.closed_multipliers[0]) < np.abs(found.multipliers[0]) < 1.0
 
 

@@ -1,4 +1,4 @@
-"""Sweeps with [control]: what they capture, that their bits do not vary, and what is refused."""
+"""Sweeps with [control]: captured lanes, reproducible bits, and refused settings."""
 
 import signal
 from functools import cache
@@ -34,7 +34,7 @@ SECTION, EXPONENT = "section_delta_5", "lyapunov_exponent"
 
 
 def short(**changes):
-    """Return the short sweep with changes; names have _ in place of dots where they are paths."""
+    """Return the short sweep with changes; a key has __ in place of a dot."""
     config = gearchaos.load_config(PUBLISHED).replace(SHORT)
     return config.replace({key.replace("__", "."): value for key, value in changes.items()})
 
@@ -104,7 +104,7 @@ def test_noise_of_each_lane_follows_from_the_seed():
     assert not np.array_equal(one[SECTION], other[SECTION])
     # With the same noise, captured lanes of one pitch error would have the same effort.
     assert len({*one["effort_recorded"].ravel().tolist()}) == one["effort_recorded"].size
-    # Noise keeps the input busy in proportion to it.
+    # On the orbit, the input is proportional to the noise.
     quiet = gearchaos.run(config.replace("control.noise", 1e-4))
     ratio = np.median(one["effort_recorded"]) / np.median(quiet["effort_recorded"])
     assert ratio == pytest.approx(10.0, rel=0.2)
@@ -139,7 +139,7 @@ def test_a_small_limit_captures_fewer_starts():
 
 
 def test_lanes_without_the_orbit_run_uncontrolled_and_are_counted(tmp_path):
-    """The orbit of period 3 of the window at P = 13 ends in a fold at P = 11.12."""
+    """The orbit of period 3 in the window at P = 13 ends in a fold at P = 11.12."""
     control = {"limit": 0.1, "found_at": 12.95, "period": 3}
     values = {"parameter": "pitch_error", "values": [11.05, 12.95, 13.0]}
     config = short(control=control, sweep=values)
@@ -228,7 +228,7 @@ def test_weights_go_with_a_linear_quadratic_gain():
 
 
 def test_an_orbit_is_controlled_on_both_sides_of_a_grazing():
-    """The unstable orbit of period 3 begins to meet a flank at P = 12.697."""
+    """The unstable orbit of period 3 grazes a flank at P = 12.697."""
     control = {"limit": 0.3, "found_at": 12.95, "period": 3}
     values = {"parameter": "pitch_error", "values": [12.69, 12.697, 12.705, 12.95]}
     result = gearchaos.run(
@@ -260,7 +260,7 @@ def test_fixing_the_swept_parameter_keeps_the_controller():
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_stopped_sweep_continues_with_the_same_bits(number, tmp_path):
-    """The controllers of the lanes are designed anew, and their noise begins anew."""
+    """The controllers of the lanes are designed again, and their noise starts again."""
     control = {"limit": 0.2, "found_at": 12.47, "noise": 1e-3, "seed": 5}
     config = with_starts(700, control=control, integration__transient_periods=300)
     (tmp_path / "pair.toml").write_text(config.resolved_toml())

@@ -1,7 +1,7 @@
 """Branches and boundaries that have corners, because a contact begins or ends at mesh phase 0.
 
 A phase of the only force shifts the time: motions and multipliers stay the same. The damper of the
-stop acts in contact only, so that its force jumps.
+stop acts in contact only; its force therefore jumps.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ PHASE = "force.one.phase_deg"
 
 
 def test_a_branch_continues_beyond_its_corners():
-    """Its motions are the same at all phases."""
+    """The motions of the branch are the same at all phases."""
     (whole,) = branches(1, PHASE, 0.0, 360.0, **JUMPING, first=2.5)
     assert whole.ends == (EDGE, EDGE)
     assert whole.value[[0, -1]].tolist() == [0.0, 360.0]
@@ -27,7 +27,7 @@ def test_a_branch_continues_beyond_its_corners():
 
 
 def test_a_boundary_continues_beyond_its_corners():
-    """Motions graze each flank at one amplitude, whatever the phase."""
+    """Motions graze each flank at the same amplitude for every phase."""
     second = """
 [second_sweep]
 parameter = "force.one.amplitude"

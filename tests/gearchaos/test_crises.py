@@ -1,4 +1,4 @@
-"""A crisis is found where chaos is known to burst out, and nowhere else."""
+"""A crisis is found only where a chaotic set is known to grow suddenly."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from gearchaos.results.reading.result import Result
 from .listed_variables import sweep_variables
 
 MERGING = 1.5 * np.sqrt(3.0)
-"""Where the two chaotic sets of the cubic map meet: its maximum comes to its zero."""
+"""Parameter at which the two chaotic sets of the cubic map meet: its maximum equals its zero."""
 
 GROWTH = np.linspace(MERGING - 0.0615, MERGING + 0.0585, 41)
 
 
 def cubic(points: int = 400) -> tuple[np.ndarray, np.ndarray]:
-    """Sections of x -> a x - x^3, the right one of its two sets, and whether they are chaotic."""
+    """Return sections of x -> a x - x^3 in the right one of two sets, and whether chaotic."""
     x = np.full(GROWTH.size, 0.5)
     sections, growth = [], np.zeros(GROWTH.size)
     for number in range(2000 + points):
@@ -34,7 +34,7 @@ def test_the_two_sets_of_the_cubic_map_merge_where_they_are_known_to():
     (lane,) = grows_at(extent, chaotic)
     assert GROWTH[lane - 1] < MERGING < GROWTH[lane]
     assert extent[lane] > 1.9 * extent[lane - 1]
-    # Backwards the set shrinks, and that is found from the other side.
+    # Backwards the set shrinks; such a crisis is found from the other side.
     assert grows_at(extent[::-1], chaotic[::-1]).size == 0
 
 
@@ -42,13 +42,13 @@ def test_the_two_sets_of_the_cubic_map_merge_where_they_are_known_to():
     "extent",
     [
         np.ones(41),
-        np.linspace(1.0, 3.0, 41),  # Growing all the time.
+        np.linspace(1.0, 3.0, 41),  # Steady growth.
         1.1 ** np.arange(41),
         1.0 + 0.03 * np.random.default_rng(2).normal(size=41),
         np.where(np.arange(41) == 20, 1.5, 1.0),  # A single burst.
         np.where(np.arange(41) >= 20, 1.1, 1.0),  # Too small.
         np.where(np.arange(41) >= 39, 1.5, 1.0),  # Too few lanes.
-        # Not level before: a lane of the eight has burst out nearly as far.
+        # Not level before: one of the eight lanes is nearly as large.
         np.select([np.arange(41) == 14, np.arange(41) >= 20], [2.0, 2.5], 1.0),
     ],
 )
@@ -81,7 +81,7 @@ def result(backwards: bool) -> Result:
     lanes = (GROWTH.size,)
     arrays |= {
         "section_delta_5": section,
-        # Grows at the same place, but less.
+        # This section grows at the same place, but less.
         "section_delta_5_rate": np.maximum(section, -0.5),
         "motion": np.where(chaotic, CHAOTIC, PERIODIC).astype(np.uint8),
         "period": np.where(chaotic, 0, 1).astype(np.int32),
@@ -100,7 +100,7 @@ def test_a_crisis_reports_what_the_section_spans_on_both_sides(backwards):
     (crisis,) = crises(result(backwards))
     spacing = GROWTH[1] - GROWTH[0]
     merging = GROWTH[0] + GROWTH[-1] - MERGING if backwards else MERGING
-    # A lane beside it a hundred points may all lie in one of the two sets still.
+    # One lane beyond the merging, all hundred points may still lie in one of the two sets.
     assert crisis.below - spacing < merging < crisis.above + spacing
     assert crisis.above - crisis.below == pytest.approx(spacing)
     one, other = (crisis.lowest_below, crisis.lowest_above)[:: -1 if backwards else 1]

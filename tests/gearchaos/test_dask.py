@@ -1,4 +1,4 @@
-"""Blocks computed by dask workers: real schedulers and processes, some of which are killed."""
+"""Dask workers compute blocks, with real schedulers and processes; tests kill some of them."""
 
 import json
 import os
@@ -24,14 +24,14 @@ from .commands import HANGS, LINEAR, begin, is_running, names_in, same_data, sma
 pytest.importorskip("distributed")
 
 BLOCKS = "gears.h5.blocks"
-# Eight blocks of lanes that take a tenth of a second or more each.
-# More blocks than two for each worker of a machine of some cores: those are all finished.
+# Each block of lanes takes a tenth of a second or more. On a machine with a few cores there are
+# more than two blocks per worker: after an interrupt, each worker still finishes two.
 LONG = ("--set", "sweep.count=8000", "--set", "integration.transient_periods=250")
 LONG += ("--set", "outputs.motion=false")
-# Many more of them, for what is not waited for: a busy machine does not finish them meanwhile.
+# Many more blocks, for tests that stop the sweep: it must not end before, even on a busy machine.
 ENDLESS = ("--set", "sweep.count=100000")
 SCHEDULER, WORKER = "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"
-# What all processes import, and that they run beside each other.
+# Options of all processes: their imported modules, and that they run beside each other.
 TOGETHER = {"imported": (SCHEDULER, WORKER), "beside": True}
 
 
@@ -49,13 +49,13 @@ def undisturbed(tmp_path_factory):
 
 @contextmanager
 def running(module, *arguments, cwd, **options):
-    """Run a module of dask for as long as the context lasts, and yield how to kill it."""
+    """Run a module of dask while the context lasts, and yield a function that kills it."""
     process, ended = begin(module, arguments, cwd, **TOGETHER, **options)
     try:
         yield lambda: killed(process)
     finally:
         killed(process)
-        # Schedulers may log a traceback when the other end of a connection goes first.
+        # Schedulers may log a traceback when the other end of a connection closes first.
         ended.unjudged()
 
 
@@ -66,7 +66,7 @@ def killed(process):
 
 @contextmanager
 def mortal_scheduler(folder):
-    """Run a scheduler, and yield its address and how to kill it."""
+    """Run a scheduler, and yield its address and a function that kills it."""
     file = folder / "scheduler.json"
     flags = ("--scheduler-file", str(file), "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
     with running(SCHEDULER, *flags, cwd=folder) as kill:
@@ -82,13 +82,13 @@ def scheduler(folder):
         yield address
 
 
-# A worker has no nanny that would start it again once it is killed.
+# A worker has no nanny, which would restart a killed worker.
 WORKS = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
 ALONE = {"NUMBA_NUM_THREADS": "1"}
 
 
 def worker(address, folder):
-    """Run a worker and yield how to kill it."""
+    """Run a worker and yield a function that kills it."""
     return running(WORKER, address, *WORKS, cwd=folder, variables=ALONE)
 
 
@@ -106,13 +106,13 @@ def odd_worker(address, folder, before):
 
 
 def timeout(seconds):
-    """Return the variable that tells dask how long to wait for an answer."""
+    """Return the environment variable that sets how long dask waits for an answer."""
     return {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": seconds}
 
 
 @contextmanager
 def begun(folder, *arguments):
-    """Start the long sweep and yield its process, and its end, once a block is finished."""
+    """Start the long sweep; after its first block, yield its process and a function that waits."""
     small_config(folder)
     words = ("gears.toml", *LONG, *arguments)
     variables = timeout("60s")
@@ -147,10 +147,10 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
 
 @pytest.mark.slow
 def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_path, undisturbed):
-    # One more than there are cores, which is allowed and remarked.
+    # One worker more than there are cores is allowed, with a message.
     cores = numba.config.NUMBA_NUM_THREADS
     with begun(tmp_path, "--dask", f"local:{cores + 1}") as (process, ended):
-        # Ctrl-C in a terminal reaches everybody.
+        # Ctrl-C in a terminal reaches all processes.
         workers = psutil.Process(process).children(recursive=True)
         for each in (psutil.Process(process), *workers):
             each.send_signal(signal.SIGINT)
@@ -168,7 +168,7 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
 @pytest.mark.slow
 def test_flow_maps_that_workers_make_give_the_bits_of_those_made_here(tmp_path):
     own = (*LINEAR, "--set", "integration.method=flow_map", "--quiet")
-    # Every value of the one parameter has maps of its own, which no value of the other changes.
+    # Every mesh frequency has its own maps; the load does not change them.
     own += ("--set", 'sweep={parameter="mesh_frequency", from=0.2, to=2.0, count=200}')
     own += ("--set", 'second_sweep={parameter="load", values=[0.1, 0.2, 0.3]}')
     assert sweep(tmp_path, *own, "--dask", "local:1") == (0, "gears.h5\n", "")
@@ -205,7 +205,7 @@ def test_a_scheduler_that_goes_away_costs_nothing_that_is_finished(tmp_path):
     with begun_and_lost(cluster, tmp_path) as ended:
         code, out, err = ended()
     assert (code, out) == (4, ""), err
-    # Who asks it just then waits for an answer; on a busy machine that comes first.
+    # A request at this moment waits for an answer; on a busy machine it may time out first.
     assert re.search("the connection to the scheduler was lost|silent for .* alive[?]", err), err
     assert "lanes are kept" in err
 
@@ -223,7 +223,7 @@ def begun_and_lost(cluster, folder):
 
 @contextmanager
 def port(answer):
-    """Listen on a port, say something to whoever connects, None for silence; yield its address."""
+    """Listen on a port, send an answer to the first client, or none for None; yield the address."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def speak():
@@ -239,7 +239,7 @@ def port(answer):
 
 def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
     with port(None) as silent, port(b"HTTP/1.0 400 Bad Request\r\n\r\n") as other:
-        # On a busy machine dask is too slow to say itself that the time is up.
+        # On a busy machine dask is too slow to report the end of its own time limit.
         for address, reason in {
             "tcp://127.0.0.1:9": "Timed out|silent for 1 s",
             silent: "silent for 1 s",
@@ -330,7 +330,7 @@ def test_what_a_cluster_cannot_do_is_code_2(tmp_path, arguments, message):
     ended = sweep(tmp_path, *arguments)
     assert (ended.code, ended.out) == (2, "")
     assert message in ended.err
-    assert "continue with" not in ended.err  # It would be refused again.
+    assert "continue with" not in ended.err  # The command would be refused again.
     assert names_in(tmp_path) == ["gears.toml"]
 
 
@@ -345,7 +345,8 @@ def test_without_the_extra_the_message_names_it(tmp_path):
 
 def test_a_worker_that_dies_before_it_has_joined_is_reported(tmp_path):
     small_config(tmp_path)
-    # Whatever a process does first when it starts: it dies once the wait has been announced.
+    # Python runs this file at the start of a process: a worker ends after the message that
+    # announces the wait.
     (tmp_path / "sitecustomize.py").write_text(
         "import os, sys, time\n"
         "if any('multiprocessing-fork' in word for word in sys.orig_argv):\n"

@@ -43,7 +43,8 @@ def test_the_error_bounds_the_spread_of_exponents_that_vary_together():
 
 @pytest.mark.parametrize(
     ("largest", "least"),
-    # In standard errors: certain orbit, nearly a torus, torus, torus that may be an orbit.
+    # The exponent is given in standard errors: a certain orbit, an orbit that may be a torus, a
+    # torus, and a torus that may be an orbit.
     [(-9.0, 0.0), (-2.5, 0.9), (-0.5, 0.0), (-1.5, 0.9)],
 )
 def test_the_error_has_the_step_of_a_decision_that_an_error_can_change(largest, least):

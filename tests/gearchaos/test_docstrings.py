@@ -1,4 +1,4 @@
-"""Docstrings of public names: numpydoc sections, and examples that run."""
+"""Docstrings of public names have the sections of numpydoc, and their examples run."""
 
 import ast
 import doctest
@@ -28,7 +28,7 @@ SHORT = ("integration.transient_periods=50", "integration.recorded_periods=20")
 SHORT += ("outputs.section_points=10",)
 ONE_VALUE = ("sweep={parameter='pitch_error', values=[5.0]}",)
 
-# Sweeps that the examples read: enough lanes and periods for every figure, and no more.
+# Sweeps that the examples read, with just enough lanes and periods for every figure.
 FILES = {
     "pan2021": ("sweep={parameter='pitch_error', from=2.5, to=12.5, count=5}",),
     "speeds": (
@@ -88,7 +88,7 @@ def sections(text: str) -> dict[str, str]:
 
 
 def missing(name: str, one: Any) -> list[str]:
-    """Return what the docstring of a public name lacks."""
+    """Return the parts that the docstring of a public name lacks."""
     found = sections(inspect.getdoc(one) or "")
     if inspect.isclass(one):
         described = {"Attributes", "Parameters"} & {*found}
@@ -128,7 +128,7 @@ def test_a_docstring_without_sections_is_found():
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory):
-    """Prepare a folder with the results that the examples read, and their names."""
+    """Prepare a folder with the results that the examples read; yield the names they use."""
     folder = tmp_path_factory.mktemp("examples")
     (folder / "sweeps").symlink_to(CLONE / "sweeps")
     with pytest.MonkeyPatch.context() as patch:
@@ -164,7 +164,7 @@ def test_the_examples_run(names):
 
 
 def test_functions_are_short_and_have_few_arguments():
-    """Docstrings may be long; what a function does may not."""
+    """Docstrings may be long; the code of a function may not."""
     found = 0
     for path in (CLONE / "gearchaos").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -1,4 +1,4 @@
-"""Gears drawn at random are the worst of their form that still pass, everywhere the same."""
+"""Randomly drawn gears just reach one of their two limits, and are the same on every machine."""
 
 import numpy as np
 import pytest
@@ -33,8 +33,9 @@ def test_an_eccentricity_alone_is_a_sine_of_the_rotation():
 def test_single_deviations_are_normal_and_independent():
     f = singles(drawn_gears(np.arange(4000), 0, 0, 21, 1e9, 1.0, 0.0))
     f /= f.std(axis=1, keepdims=True)
-    # Of 84000 numbers, four standard errors of mean fourth power and of neighbours' product;
-    # scaling each gear by its own spread takes 3 to 3 (z - 1) / (z + 1).
+    # The tolerances are four standard errors, for 84000 numbers, of the mean fourth power and of
+    # the mean product of neighbours. As each gear is scaled by its own spread, the fourth power of
+    # z teeth is 3 (z - 1) / (z + 1) instead of 3.
     assert np.mean(f**4) == pytest.approx(3.0 * 20 / 22, abs=4 * np.sqrt(96 / f.size))
     assert np.mean(f * np.roll(f, 1, axis=1)) == pytest.approx(-1 / 20, abs=4 / np.sqrt(f.size))
 

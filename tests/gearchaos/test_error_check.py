@@ -1,4 +1,4 @@
-"""The error of a lane is what half the step changes; it is told of the lanes it was measured on."""
+"""The error of a lane is its change with half the step; it is reported for checked lanes only."""
 
 import numpy as np
 import pytest
@@ -62,11 +62,11 @@ def test_the_error_is_the_difference_to_half_the_step():
 
 
 def test_flow_maps_of_half_the_step_differ_by_rounding():
-    # Where there is chaos, a lane that ends on an orbit may have come to it with an error.
+    # A chaotic transient, as beyond 10.0, may leave an error in a lane that ends on an orbit.
     calm = ("sweep.to=10.0", "integration.error_check=1.0", "integration.method=flow_map")
     exact = computed(simulation(*LONG, *calm))
     assert (exact["motion_changed"] == SAME).all()
-    # A thousand roundings of each of the steps after which nothing of an error is left.
+    # The limit allows a thousand roundings in each recent step; earlier errors have decayed.
     assert np.nanmax(exact["section_error"]) < 1e-11
     assert np.nanmax(exact["exponent_step_error"]) < 1e-11
 

@@ -1,4 +1,4 @@
-"""The ready configurations are listed and copied, and load."""
+"""The ready configurations are listed, copied and loaded."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The page of a result in a real browser: what it shows is what the file holds."""
+"""The page of a result in a real browser shows the contents of the file."""
 
 import json
 import re
@@ -28,7 +28,7 @@ from gearchaos.explore import PORTS, _free_port, main
 
 from .commands import PAGE_HANGS, served, small_config
 
-# Not imported: every process collects all files, and one of them runs this one.
+# Not imported here: every test process collects this file, but only one runs its tests.
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(missing), reason=f"without {', '.join(missing)}")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -37,7 +37,7 @@ needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromiu
 OPTIONS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking"
 OPTIONS += " --disable-component-update --disable-sync"
 ASKED = ("start.carry='both'", "sweep.count=20", "outputs.section_points=10")
-# Without a phase, for which loops are compiled once more.
+# Without a phase; with a phase, other loops would have to be compiled.
 ASKED += ("pitch_error.phase_deg=0.0",)
 HOSTILE = '<img src="x" onerror="document.hacked = 1"> $$\\href{javascript:0}{x}$$'
 PERIODS = 10
@@ -74,14 +74,14 @@ def path(tmp_path_factory) -> Path:
     config = gearchaos.load_config(small_config(folder), (*ASKED, f"title='{HOSTILE}'"))
     gearchaos.run(config).save(folder / "pair.h5")
     with h5py.File(folder / "pair.h5", "a") as file:
-        # The first lane downwards has lost its end.
+        # The first lane of the downward sweep has no end state.
         file["end_state"][0, 1], file["status"][0, 1] = np.nan, Status.DIVERGED
     return folder / "pair.h5"
 
 
 @pytest.fixture(scope="module")
 def address(path):
-    """Serve the file as a user does, for all tests, and remove it: what was opened stays."""
+    """Serve the file to all tests as a user does, then remove it: the open file stays readable."""
     copy = path.parent / "served" / path.name
     copy.parent.mkdir()
     shutil.copy(path, copy)
@@ -100,7 +100,7 @@ def browser():
 
 @pytest.fixture
 def page(browser, address):
-    """Open the page, and see that nothing comes from elsewhere and nothing goes wrong."""
+    """Open the page; check that it requests nothing from other hosts and that no error occurs."""
     opened, wrong = browser.new_page(viewport={"width": 1400, "height": 900}), []
     opened.set_default_timeout(1000.0 * PAGE_HANGS)
     opened.on("pageerror", lambda error: wrong.append(str(error)))
@@ -123,12 +123,12 @@ def look(page, address: str, view: str = "") -> dict[str, list]:
 
 
 def panels(page) -> dict[str, list]:
-    """Read what the panels of the motion show, by what stands beside their axis."""
+    """Return the data in the panels of the motion, by the labels of their vertical axes."""
     return {" ".join(name.split()): shown for name, shown in page.evaluate(PANELS) if shown}
 
 
 def lane_of(path: Path, begin: str = "end", **at):
-    """Give the lane of a file, and compute its motion as the command does."""
+    """Return the lane of a file, and its motion as the command computes it."""
     lane = gearchaos.open_result(path).sel("nearest", **at)
     config = continued(lane, str(path), begin)
     return lane, compute_response(prepared(config, PERIODS), PERIODS, "")
@@ -148,9 +148,9 @@ def click(page, across: float) -> float:
     from playwright.sync_api import Error as PlaywrightError
 
     before = lane_in(page.url)
-    # A second is enough unless the machine is busy, and a click more does no harm.
+    # A second is enough unless the machine is busy; another click does no harm.
     for _ in range(int(PAGE_HANGS)):
-        # While panels come in, the diagram moves: a click may fall beside it.
+        # While panels appear, the diagram moves, and a click may miss it.
         box = page.locator(".bk-Figure").first.bounding_box()
         place = box["x"] + across * box["width"], box["y"] + 0.5 * box["height"]
         page.mouse.move(*place)
@@ -164,7 +164,7 @@ def click(page, across: float) -> float:
 
 
 def wait_for(page, panel: str, values: np.ndarray) -> list:
-    """Wait until a panel shows these values upwards, and return all that it shows."""
+    """Wait until a panel shows these values on its vertical axis, and return all its data."""
     for _ in range(int(10 * PAGE_HANGS)):
         shown = panels(page).get(panel, [{}])
         if np.array_equal(shown[0].get("y", ()), values):
@@ -188,9 +188,9 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     assert curve["y"] == motion["delta_5_rate"][0].tolist()
     assert strobe["x"] == motion["delta_5"][0, ::40].tolist()
     assert section["x"] == motion["section_delta_5"][0].tolist()
-    # The motion goes on from the end of the lane: its first point is the last of the file.
+    # The motion continues from the end of the lane: its first point is the last one of the file.
     assert curve["x"][0] == lane["end_state"][0] == lane["section_delta_5"][-1]
-    # A line at the lane in both charts, and that of zero among the exponents.
+    # Both charts have a line at the lane; the exponents also have a line at zero.
     lines = page.evaluate(f"({FIGURES})().slice(0, 2).map({LINES})")
     assert [sorted(at) for at in lines] == [[value], [0.0, value]]
     force, *strips = shown[
@@ -200,7 +200,7 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     assert sum(len(strip["left"]) for strip in strips) > 0
     text = texts(page)
     exponent = f"λ₁ = {lane['lyapunov_exponent']:.4g} per unit of τ"
-    # Both above the diagram, of the lane under the pointer, and above the panels.
+    # Once above the diagram, for the lane under the pointer, and once above the panels.
     assert text.count(f"P = {value:.6g} period {lane['period']}, {exponent}") == 2
     assert "python -m gearchaos.plot pair.h5 --at=direction=downwards" in text
     command = f"response pair.h5 --at=pitch_error={value:.12g} --at=direction=downwards --begin end"
@@ -208,7 +208,7 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
 
 
 def zoom(page) -> None:
-    """Draw a box into the diagram, and wait for the link to what is in it."""
+    """Draw a box into the diagram, and wait for the link to its contents."""
     before, box = page.url, page.locator(".bk-Figure").first.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"])
     page.mouse.down()
@@ -218,7 +218,7 @@ def zoom(page) -> None:
 
 
 def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
-    """See that the picture after a zoom counts the points in view, for each pixel of the screen."""
+    """Check that the picture after a zoom counts the points in view for each pixel."""
     for _ in range(int(10 * PAGE_HANGS)):
         drawn = page.evaluate(PICTURE)
         left, low, *_ = drawn["seen"]
@@ -227,8 +227,8 @@ def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
         page.wait_for_timeout(100)
     np.testing.assert_allclose(drawn["frame"][2:], np.subtract(drawn["seen"][2:], (left, low)))
     assert drawn["shape"] == drawn["size"]
-    # What is sent is a picture, four bytes a pixel, however many points there are.
-    # On a busy machine the zoom may arrive in several steps, with a picture for each.
+    # The server sends a picture with four bytes per pixel, for any number of points. On a busy
+    # machine the zoom may arrive in several steps, with a picture for each step.
     pictures, rest = divmod(sum(sizes), 4 * int(np.prod(drawn["shape"])))
     assert 1 <= pictures <= 5
     assert rest < 100_000
@@ -244,7 +244,7 @@ def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
     places = np.unique(row * drawn["shape"][1] + column)
     assert 0 < inside.sum() < y.size
     assert np.isin(places, drawn["drawn"]).all()
-    # Dots so few take the pixels beside them, too, and nothing else is there.
+    # With few points, a dot also fills the pixels beside it; all other pixels are empty.
     assert len(drawn["drawn"]) <= 9 * places.size
 
 
@@ -255,7 +255,7 @@ def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
     sizes: list[int] = []
     page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
     look(page, address, "?units=dimensionless")
-    # On a busy machine a picture may be under way for longer than a second.
+    # On a busy machine a picture may take longer than a second to arrive.
     shown = -1
     while shown != len(sizes):
         shown = len(sizes)
@@ -330,7 +330,7 @@ def test_no_other_origin_is_served(address):
         asked.request("GET", "/ws", headers={**upgrade, "Origin": origin})
         assert asked.getresponse().status == 403
         asked.close()
-    # Another address of this machine, as every one but the loopback's own.
+    # The server listens on the address 127.0.0.1 only, on no other one of this machine.
     with socket.socket() as other, pytest.raises(OSError):
         other.connect(("127.0.0.2", int(port)))
 
@@ -351,7 +351,7 @@ def test_what_is_wrong_is_reported_in_a_sentence(path, tmp_path, monkeypatch, ca
     lane_of(path, pitch_error=1.0, direction="upwards")[1].save(tmp_path / "response.h5")
     code, text = said(str(tmp_path / "response.h5"))
     assert code == 2 and "is a response; python -m gearchaos.plot draws it" in text
-    # Numba that is not there or does not fit: no command can compute anything then.
+    # If Numba is missing or does not fit, no command can compute anything.
     without = "import sys; sys.modules['numba'] = None; import gearchaos.explore as command; "
     command = [sys.executable, "-c", f"{without} sys.exit(command.main())", str(path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -363,7 +363,7 @@ def test_what_is_wrong_is_reported_in_a_sentence(path, tmp_path, monkeypatch, ca
 
 
 def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
-    # Whoever makes Numba ready first decides for which processor: it has to be the kernels.
+    # The first module that prepares Numba decides on the processor: it must be the kernels.
     code = """if True:
         import sys
         from gearchaos.explore import main
@@ -379,7 +379,7 @@ def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
 
 
 def answer_to(address: str, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
-    """Return code, headers and text of an answer, as a program gets it that is no browser."""
+    """Return code, headers and text of an answer to a program that is not a browser."""
     asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=PAGE_HANGS)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     asked.request("GET", f"/{path}", headers=named)
@@ -413,7 +413,7 @@ def test_a_request_of_another_site_is_refused_and_a_link_in_it_is_not(address):
         for origin in (*others, "http://127.0.0.1:1"):
             code, headers, _ = answer_to(address, path, Origin=origin)
             assert code == 403 and "Access-Control-Allow-Origin" not in headers
-    # A script or a picture that another page names comes without an origin.
+    # A request for a script or a picture in another page has no origin.
     for site in ("cross-site", "same-site"):
         script = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "no-cors", "Sec_Fetch_Dest": "script"}
         frame = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "iframe"}

@@ -1,4 +1,4 @@
-"""The page of a sweep from a grid of starts: basins over two states, and the motion of a start."""
+"""The page of a sweep from a grid of starts shows basins over two states and motions of starts."""
 
 import shlex
 import shutil
@@ -46,7 +46,8 @@ PICTURE = """() => {
     return {cells: six.map(x => six.map(y => cell(x, y))), circles,
         lines: first.center.filter(one => one.type == "Span").map(one => one.location)}
 }"""
-"""Attractor in the middle of every cell of the drawn picture, sections, and lines of the lane."""
+"""Script that returns the attractor in the middle of every cell of the picture, the sections, and
+the lines at the lane."""
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +111,7 @@ def test_over_one_state_the_attractors_are_boxes_behind_the_diagram(folder):
     from gearchaos.explorer.shades import basin_boxes
 
     found = grid_of(folder, "line").basins({"pitch_error": 0.0}, "dimensionless")
-    # The middle starts made to lead to another attractor of the same kind.
+    # Let the middle starts lead to another attractor of the same kind.
     numbers, (first, *others) = found.numbers.copy(), found.basins
     numbers[0, 8:12] = 7
     found = found._replace(numbers=numbers, basins=[first, first._replace(number=7), *others])
@@ -124,7 +125,7 @@ def test_over_one_state_the_attractors_are_boxes_behind_the_diagram(folder):
     assert boxes[0].left < starts[0] and boxes[-1].right > starts[-1]
 
 
-# Some versions of panel that the extra allows know the title of a switch as its name only.
+# In some versions of panel that the extra allows, only the name of a switch sets its title.
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 def test_many_starts_are_chosen_by_a_number_and_few_values_from_a_menu(folder):
     import panel
@@ -187,7 +188,7 @@ def page(folder, browser):
 
 
 def click(page, start: int) -> None:
-    """Click into the basins, and wait for the commands of the start that lies there."""
+    """Click into the basins, and wait for the commands of the start at this place."""
     box = page.locator(".bk-Figure").first.bounding_box()
     place = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
     page.mouse.move(*place)
@@ -198,7 +199,7 @@ def click(page, start: int) -> None:
 def test_a_click_on_a_start_shows_its_motion_and_names_its_lane(page, plane, folder, monkeypatch):
     numbers = find_basins(plane.sel(pitch_error=0.0)).numbers.reshape(SIDE, SIDE)
     shown = page.evaluate(PICTURE)
-    # Basins without an attractor, of negative number, have the first colour.
+    # Basins without an attractor have negative numbers, and therefore the first colours.
     assert (np.array(shown["cells"]) == np.searchsorted(np.unique(numbers), numbers)).all()
     section = find_basins(plane.sel(pitch_error=0.0)).basins[0].section[0]
     states = plane.variables["state"].flags
@@ -244,5 +245,5 @@ def test_a_link_to_units_that_a_pair_lacks_is_refused_and_clicks_work(browser, p
     with opened(browser, folder, "pure.h5", "?units=physical") as page:
         page.get_by_text("does not give the length_scale").wait_for()
         page.wait_for_url("**units=dimensionless*")
-        # Below the message, the page is as without it.
+        # Below the message, the page works as without it.
         click(page, 1 * SIDE + 4)

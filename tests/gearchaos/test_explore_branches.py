@@ -1,4 +1,4 @@
-"""Branches and boundaries in the explorer: what a page draws, its switch, and what is refused."""
+"""Branches and boundaries in the explorer: how they are drawn and hidden, and refused input."""
 
 import json
 from dataclasses import replace
@@ -39,7 +39,7 @@ SHOWN = """() => [...Bokeh.documents[0]._all_models.values()]
 
 
 def parabola() -> PeriodicBranch:
-    """Return a branch that is stable up to its fold in the middle, and unstable behind it."""
+    """Return a branch that is stable up to its fold in the middle, and unstable beyond it."""
     y = TOP + np.linspace(-1.0, 1.0, 41)
     section = np.stack([y, 0.0 * y], axis=-1)[:, np.newaxis]
     multipliers = np.stack([1.0 + 0.3 * (y - TOP), 0.0 * y], axis=-1).astype(complex)
@@ -93,7 +93,7 @@ def _there(values: list) -> list:
 
 
 def assert_parabola(page, digits: float) -> None:
-    """See that a page draws the stable half solid, the unstable half dashed, and the fold."""
+    """Check that a page draws the stable half solid, the unstable half dashed, and the fold."""
     (_, dashes, unstable), (_, solid, stable) = dashed_and_solid(page)
     assert dashes and not solid
     expected = parabola()
@@ -133,7 +133,7 @@ def test_a_saved_page_draws_branches_and_its_switch_hides_them(folder):
         page.locator("input[type=checkbox]").check()
         page.get_by_text("unstable orbits").wait_for()
         assert all(one[0] for one in dashed_and_solid(page))
-        # Of a variable that the orbits do not have, the page says so.
+        # The page reports a variable that the orbits do not have.
         page.locator("select").select_option(index=1)
         page.locator("text=of the branches >> visible=true").wait_for()
         browser.close()
@@ -155,7 +155,7 @@ def test_a_saved_map_draws_boundaries(folder):
         lines, marks = glyphs(page, "Line"), glyphs(page, "Scatter", "text")
         browser.close()
     found = {json.dumps([_there(one[2]["x"]), _there(one[2]["y"])]) for one in lines}
-    # The same curve in the map of every variable.
+    # The maps of all variables have the same curve.
     ((x, y),) = map(json.loads, found)
     np.testing.assert_allclose(sorted(x), sorted(parabola().value), rtol=1e-6)
     np.testing.assert_allclose(y, np.linspace(0.1, 0.2, 41), rtol=1e-6)
@@ -182,7 +182,7 @@ def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
         page.locator("input[type=checkbox]").uncheck()
         page.wait_for_url("**/?*branches=false*")
         page.get_by_text("unstable orbits").wait_for(state="detached")
-        # The legend may be gone before the lines are.
+        # The legend may disappear before the lines.
         until(page, lambda: not any(one[0] for one in dashed_and_solid(page)))
         assert "--branches" not in page.locator("pre").inner_text()
         link = page.url

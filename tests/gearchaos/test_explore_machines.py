@@ -1,4 +1,4 @@
-"""The page of a machine: its coordinates, its elements, and the motion of a lane."""
+"""The page of a machine shows its coordinates, its elements and the motion of a lane."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Every entry of every menu of the page, for each kind of result, in a real browser."""
+"""A real browser draws every entry of every menu of the page, for each kind of result."""
 
 from pathlib import Path
 
@@ -36,10 +36,10 @@ KINDS = {
 AT_MOST = 60_000  # Milliseconds, far above the time of a change on a busy machine.
 MENUS = """all => all.map(menu => [menu.getRootNode().querySelector("label").textContent,
     [...menu.options].map(one => [one.value, one.textContent])])"""
-"""Title of every menu, and value and text of its entries."""
+"""Script that returns the title of every menu, and value and text of its entries."""
 LABELS = """[...Bokeh.documents[0]._all_models.values()]
     .filter(one => one.type == "Figure").map(one => one.left[0].axis_label)"""
-"""Labels at the vertical axes of all charts that the page has drawn."""
+"""Script that returns the labels at the vertical axes of all drawn charts."""
 BELOW = LABELS.replace("left", "below")
 FAULT = f"b[style*='{VERMILION}']"
 
@@ -71,12 +71,12 @@ def test_every_entry_of_every_menu_is_drawn(kind, browser, tmp_path):
         page = browser.new_page(viewport={"width": 800, "height": 600})
         page.set_default_timeout(AT_MOST)
         page.goto(f"{address}?units=dimensionless")
-        # A chart, and the four panels of the motion.
+        # The page has a chart and the four panels of the motion.
         page.locator(".bk-Figure >> nth=4").wait_for()
         page.locator("pre:has-text('response')").wait_for()
         result = gearchaos.open_result(path)
         seen = entries_drawn(page, result)
-        # The spectrum of teeth with errors of their own has orders of their shaft.
+        # With errors of single teeth, the spectrum has orders of the driving shaft.
         below = page.evaluate(BELOW)
         assert ("Order of the driving shaft (mesh: 21)" in below) == (kind == "grades")
         page.close()
@@ -95,7 +95,7 @@ def variables_of(result: gearchaos.Result) -> list[str]:
 
 
 def entries_drawn(page, result: gearchaos.Result) -> list[str]:
-    """Choose every entry of every menu, see that it is drawn, and return the variables."""
+    """Choose every entry of every menu, check that it is drawn, and return the variables."""
     drawn: list[str] = []
     menus = page.locator("select")
     for place, (title, entries) in enumerate(menus.evaluate_all(MENUS)):

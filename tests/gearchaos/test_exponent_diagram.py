@@ -14,7 +14,7 @@ def test_the_spectrum_of_exponents_is_a_diagram(tmp_path, capsys):
     changes = (*LINEAR[1::2], "outputs.exponents=true", "sweep.count=6")
     result = gearchaos.run(gearchaos.load_config(small_config(tmp_path), changes))
     drawn = bifurcation(Figure().subplots(), result, "lyapunov_exponents")
-    # Two exponents of each of six lanes; those of a linear pair sum to minus its damping.
+    # Each of the six lanes has two exponents.
     exponents = np.sort(drawn.points.get_ydata())
     np.testing.assert_array_equal(exponents, np.sort(result["lyapunov_exponents"].ravel()))
     assert result["lyapunov_exponents"].shape == (6, 2)

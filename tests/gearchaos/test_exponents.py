@@ -1,4 +1,4 @@
-"""All Lyapunov exponents: their exact sum, stored multipliers, the single-vector exponent."""
+"""All Lyapunov exponents: their exact sum, stored multipliers and the exponent of one vector."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def plan(steps: int, periods: int, transient: int = 0, resolved: bool = True) ->
 
 
 def exponents_of(effects, groups, steps, periods, transient=0, resolved=True):
-    """Exponents from rest."""
+    """Return the exponents of motions from rest."""
     system = system_of(groups, effects)
     start = np.zeros((system.lanes, len(system.states)))
     return exponents(system, start, plan(steps, periods, transient, resolved))
@@ -53,7 +53,7 @@ def multipliers(orbit: dict, steps: int) -> np.ndarray:
 
 
 def distance(found: np.ndarray, wanted: np.ndarray) -> float:
-    """Largest distance of a wanted multiplier from the nearest found one, and the reverse."""
+    """Return the largest distance of a multiplier in one set from the nearest in the other set."""
     between = np.abs(found[:, np.newaxis] - wanted)
     return float(max(between.min(axis=0).max(), between.min(axis=1).max()))
 
@@ -75,7 +75,7 @@ def test_sum_of_all_exponents_is_the_trace_whether_periodic_or_chaotic(scene, st
 def test_frames_of_the_kernels_are_those_of_a_decomposition_after_every_period(monkeypatch):
     groups = pan2021(PERIODIC_AND_CHAOTIC)
     found = exponents_of(NO_AXIAL, groups, 200, 8, 4)
-    # As for systems with more states than a block has lanes.
+    # Use the method for systems with more states than a block has lanes.
     monkeypatch.setattr("gearchaos.dynamics.exponents.LANES", 1)
     assert found.values == pytest.approx(
         exponents_of(NO_AXIAL, groups, 200, 8, 4).values, abs=1e-12
@@ -126,7 +126,7 @@ def test_sum_in_closed_form_follows_every_damping_and_nothing_else():
 
 @pytest.mark.parametrize("orbit", ORBITS, ids=lambda o: f"{o['scene']}-{o['pitch_error']}")
 def test_multipliers_of_a_periodic_orbit_are_the_stored_ones(orbit):
-    # How their error falls with the step is for the polished orbits to show.
+    # The tests of polished orbits show how the error falls with the step.
     stored = np.array([complex(*pair) for pair in orbit["floquet_multipliers"]])
     assert distance(multipliers(orbit, 1600), stored) < 2e-7
 
@@ -151,7 +151,7 @@ def test_largest_of_all_exponents_is_the_exponent_of_a_single_vector():
     exponent, error = largest_exponent(growth, np.full(4, PERIOD))
     found = exponents_of(NO_AXIAL, model, 200, 400, 300)
     assert found.values[:2, 0] == pytest.approx(exponent[:2], rel=0, abs=1e-6)
-    # Two records of one chaotic motion.
+    # In chaos, the two exponents belong to different records of one motion.
     margin = 4.0 * np.hypot(error, found.standard_errors[:, 0])
     assert np.all(np.abs(found.values[2:, 0] - exponent[2:]) < margin[2:])
     assert np.all(found.values[2:, 0] > 0.03)
@@ -170,7 +170,7 @@ def test_jacobian_over_several_periods_is_the_product_of_those_over_one():
 
 @pytest.mark.parametrize(("resolved", "steps", "apart"), [(False, 100, 1e-8), (True, 1600, 2e-6)])
 def test_jacobian_is_the_difference_of_neighbouring_motions(resolved, steps, apart):
-    # A split step takes the crossing of the motion itself for its neighbours: an error of order 4.
+    # A split step uses the crossing of the motion also for its neighbours: an error of order 4.
     start = np.random.default_rng(2).standard_normal((1, 10))
     system, wanted = system_of(pan2021(5.86)), plan(steps, 1, resolved=resolved)
     wanted = wanted._replace(tangent=True)
@@ -192,7 +192,7 @@ def test_a_lane_that_diverges_has_no_spectrum_and_leaves_the_others_alone():
 
 
 def test_directions_that_become_parallel_within_a_period_are_not_distinguished():
-    # 63 units of tau contract one direction by e^-100 and more against the slowest.
+    # Within 63 units of tau, one direction contracts by e^-100 or more relative to the slowest.
     model = pan2021(0.0, mesh_frequency=0.1, damping_ratio=1.5)
     found = exponents_of(TORSION_ONLY, model, 1000, 20, 5).values[0]
     assert np.isfinite(found[0])
@@ -209,7 +209,8 @@ def test_one_period_gives_exponents_without_standard_errors():
 
 @pytest.mark.parametrize(("exponent_gap", "resolved"), [(16.0, True), (20.0, False), (30.0, False)])
 def test_an_exponent_is_given_as_long_as_rounding_leaves_half_of_its_digits(exponent_gap, resolved):
-    # Overdamped and linear: decays xi -+ sqrt(xi^2 - 1) that part by the gap in a mesh period.
+    # Overdamped and linear: within a mesh period, the decays at the rates xi -+ sqrt(xi^2 - 1)
+    # differ by the gap.
     damping_ratio = 1.5
     root = np.sqrt(damping_ratio**2 - 1.0)
     model = pan2021(
@@ -222,7 +223,7 @@ def test_an_exponent_is_given_as_long_as_rounding_leaves_half_of_its_digits(expo
     assert found[0] == pytest.approx(root - damping_ratio, abs=1e-9)
     assert np.isfinite(found[1]) == resolved
     if resolved:
-        # Eps over exp(-16) of a vector is 2e-9, and the mean of 30 periods is no worse.
+        # The rounding eps / exp(-16) of a vector is 2e-9; the mean of 30 periods is no worse.
         assert found[1] == pytest.approx(-root - damping_ratio, abs=1e-7)
 
 
@@ -265,7 +266,7 @@ def test_two_standard_errors_cover_the_exponent_of_a_weakly_damped_pair():
     period = np.zeros(200, dtype=np.int32)
     found = largest_exponents(system, outcome, record, period, outcome.end_state)
     mean = np.mean(found.values)
-    # The mean of 200 lanes is known fourteen times better than one of them.
+    # The error of the mean of 200 lanes is fourteen times smaller than that of one lane.
     assert mean > 0.01
     assert np.mean(np.abs(found.values - mean) <= 2.0 * found.standard_errors) >= 0.92
     _, blind = largest_exponent(outcome.growth, system.mesh_period)

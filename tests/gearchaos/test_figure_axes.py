@@ -1,4 +1,4 @@
-"""A diagram runs over one parameter; of several axes it says which slice it shows."""
+"""A diagram has one parameter as its axis; for several axes it names the slice that it shows."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def test_a_legend_below_a_page_has_the_columns_that_fit(width):
     legend = legend_below(figure, handles, None, 5)
     one = Figure().legend(handles=handles[:1]).get_window_extent().width
     assert legend.get_window_extent().width <= figure.bbox.width
-    # With two more columns it would not fit; there are five at most.
+    # The legend has at most five columns; with two more it would not fit.
     assert legend._ncols == 5 or (legend._ncols + 2) * one > figure.bbox.width
     assert figure.legends == [legend]
 
@@ -53,7 +53,7 @@ def test_a_slice_of_two_parameters_is_drawn_and_named():
 
 
 def test_a_label_has_the_fewest_lines_and_of_those_the_shortest():
-    """Filled up to 24 characters, the first line would leave a single word for the second."""
+    """A first line filled up to 24 characters would leave a single word for the second line."""
     words = "one two three four five six"
     renamed = replace(BOTH.variables["lyapunov_exponent"], long_name=words, symbol="", units="m")
     variables = [renamed if v.name == renamed.name else v for v in BOTH.variables.values()]

@@ -1,4 +1,4 @@
-"""Points too many to be drawn one by one are counted, for the same picture in little memory."""
+"""Very many points are counted instead of drawn one by one: the same picture in little memory."""
 
 import tracemalloc
 
@@ -28,7 +28,7 @@ def panel(dpi: int = 100):
 def lanes_of(count: int, diverged: tuple[int, ...] = ()) -> ShownLanes:
     out = np.zeros(count, bool)
     out[list(diverged)] = True
-    # The lanes of a result may come in another order than the parameter.
+    # The order of the lanes of a result may differ from the order of the parameter.
     return ShownLanes(np.arange(count)[::-1], np.linspace(0.0, 1.0, count), out, (0.0, 1.0))
 
 
@@ -38,7 +38,7 @@ def picture(axes) -> np.ndarray:
 
 
 def wide_sweep(count: int, points: int, *, exponent=None) -> Result:
-    """A sweep whose section is a line up to the middle, and fills a band from there."""
+    """Return a sweep whose section is a line up to the middle and a filled band beyond it."""
     load = np.linspace(0.0, 1.0, count)
     section = np.where(load < 0.5, 0.5 * load, 1.0)[:, np.newaxis] * RANDOM.random((count, points))
     section[load < 0.5] = load[load < 0.5, np.newaxis]
@@ -74,7 +74,7 @@ def test_counted_dots_are_the_picture_of_the_dots(dpi, look, monkeypatch):
         pictures.append(picture(axes))
     one_by_one, counted = pictures
     np.testing.assert_array_equal((counted < 255).any(axis=2), (one_by_one < 255).any(axis=2))
-    # Dots that are laid over one another one by one are rounded to eight bits each time.
+    # When dots are drawn one over the other, the colour is rounded to eight bits each time.
     apart = np.abs(counted - one_by_one)
     assert apart.mean() < 0.25
     assert np.quantile(apart, 0.99) <= 8
@@ -91,7 +91,7 @@ def test_every_point_within_the_limits_is_counted_once():
     shown[lanes.numbers[lanes.diverged]] = False
     counted = counts(axes, lanes, rows)
     assert counted.sum() == np.count_nonzero(shown)
-    # The parameter ascends while the number of the lane falls: the points are in the right half.
+    # The parameter rises while the number of the lane falls: the points are in the right half.
     assert counted[:, : counted.shape[1] // 2 - 1].sum() == 0
 
 
@@ -118,7 +118,7 @@ def test_drawing_takes_far_less_memory_than_the_points():
     picture(axes)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    # The points themselves, which the result holds, take 8 bytes each.
+    # In the result, every point takes 8 bytes.
     assert peak < 20 * 2_000_000
 
 
@@ -145,6 +145,6 @@ def test_of_very_many_lanes_the_outermost_of_each_column_are_drawn():
     ticks = chart.diverged.get_xdata()
     assert ticks.size <= COLUMNS
     assert (ticks.min(), ticks.max()) == pytest.approx((0.4, 0.6), abs=1.5 / COLUMNS)
-    # What lies out of view is judged by all lanes.
+    # The marks of points off the scale consider all lanes, also those that are not drawn.
     beyond = [mark.get_xdata().tolist() for mark in chart.off_scale]
     assert beyond == [[result["load"][777]], [result["load"][40_001]]]

@@ -1,4 +1,4 @@
-"""Lines of figures: broken at jumps, of one width, and texts and fonts that editors can use."""
+"""Lines of figures break at jumps and have one width; editors can use texts and fonts."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ from .test_plot import run
 
 LANES = 40
 JUMP, DOUBLED, CHAOTIC, DIVERGED = 10, 20, 30, 36
-"""First lanes behind a jump, of period 2 and of chaos, and the only lane that diverged."""
+"""First lanes after a jump, of period 2 and of chaos, and the only lane that diverged."""
 
 
 def steps(labels: bool = True) -> Result:
@@ -58,7 +58,7 @@ def steps(labels: bool = True) -> Result:
 
 
 def pieces(result: Result) -> list[int]:
-    """Return the number of lanes of each piece of the line, those of single lanes left out."""
+    """Return the number of lanes of each piece of the line, except for pieces of one lane."""
     drawn = bifurcation(Figure().subplots(), result, "lyapunov_exponent", lines=True)
     there = np.isfinite(drawn.parts["line"].get_ydata())
     sizes = [len(piece) for piece in "".join("x" if one else " " for one in there).split()]

@@ -1,4 +1,4 @@
-"""What the figures show is what the result holds, and they say what they leave out."""
+"""Figures show the contents of a result, and name the parts that they leave out."""
 
 import os
 import subprocess
@@ -213,7 +213,7 @@ def test_a_second_result_widens_the_limits_and_every_lane_is_seen_or_marked(axes
     bottom, top = axes.get_ylim()
     points = np.concatenate([one.points.get_ydata() for one in (first, second)])
     assert np.count_nonzero((points < bottom) | (points > top)) == 1
-    # The triangle was drawn anew, at the edge as it is now, and the legend has all names.
+    # The triangle is drawn again at the new edge, and the legend has all names.
     assert outlier.axes is None and first.off_scale[0].axes is axes
     np.testing.assert_array_equal(first.off_scale[0].get_xdata(), result["growth"][[60]])
     assert second.off_scale == []
@@ -242,7 +242,7 @@ def test_limits_hold_everything_where_nothing_lies_far_out():
 
 def test_limits_reach_half_of_the_inner_height_beyond_it():
     values = np.linspace(0.0, 1.0, 400)
-    # The inner 94 % end near 1, so that what lies below 1.5 is shown and what lies above is not.
+    # The inner 94 % end near 1, so that values up to 1.5 are shown and values above it are not.
     values[[10, 11, 12]] = 1.4, 1.7, 10.0
     bottom, top = robust_limits(values, values)
     assert -0.2 < bottom < 0.0

@@ -1,7 +1,7 @@
-"""Two sweeps never write to one output, whatever locks the system has.
+"""Two sweeps never write to one output, with every kind of file locks and without locks.
 
-Windows and a file system without locks are made in processes of their own. The byte ranges of
-Windows become those of POSIX, which other processes see in the same way.
+Separate processes imitate Windows and a file system without locks. Locks of byte ranges on Windows
+become such locks of POSIX, which other processes see in the same way.
 """
 
 import re
@@ -55,7 +55,7 @@ for line in sys.stdin:
 lock.release()
 """
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="makes Windows of Unix")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="imitates Windows on Unix")
 
 
 @contextmanager
@@ -71,7 +71,7 @@ def holder(system, kind, folder):
 
 
 def alone(process):
-    """Ask a holder to take the lock for itself."""
+    """Ask a holder to take the lock alone, and return whether it has done so."""
     process.stdin.write("\n")
     process.stdin.flush()
     return process.stdout.readline().strip() == "alone"
@@ -79,7 +79,7 @@ def alone(process):
 
 @pytest.fixture(params=SYSTEMS)
 def hold(request, tmp_path):
-    """Return a function that starts a holder in this system until the test ends."""
+    """Return a function that starts a holder in this system; it runs until the test ends."""
     with ExitStack() as stack:
         yield lambda kind: stack.enter_context(holder(request.param, kind, tmp_path))
 
@@ -96,7 +96,7 @@ def test_shards_share_a_lock_until_one_of_them_is_the_last(hold):
     assert said == also == "locked\n"
     assert hold("whole")[1].startswith("refused: ")
     assert not alone(first)
-    # It still holds its share.
+    # The first process still holds its share.
     assert not alone(second)
     second.kill()
     second.wait()

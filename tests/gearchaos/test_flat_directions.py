@@ -1,4 +1,4 @@
-"""What observations leave open is found: along flat directions, within the candidates granted."""
+"""A search finds the directions that observations leave open, within its candidates."""
 
 import re
 
@@ -16,19 +16,19 @@ from .test_identify import command
 
 TRUTH = np.array([0.45, 0.4, 0.55])
 FREE = np.array([1.0, 0.7, -0.7]) / np.sqrt(1.98)
-"""A direction along which the residuals of `sums` are what they are."""
+"""A direction along which the residuals of `sums` do not change."""
 
 WIDTHS = 40.0
 
 
 def sums(points):
-    """Residuals that are linear in three parameters, two numbers that FREE does not change."""
+    """Return two residuals that are linear in three parameters and do not change along FREE."""
     across = np.linalg.svd(FREE[np.newaxis])[2][1:]
     return WIDTHS * (points - TRUTH) @ across.T
 
 
 def each(points):
-    """Residuals that determine every parameter."""
+    """Return residuals that determine every parameter."""
     return WIDTHS * (points - TRUTH)
 
 
@@ -54,17 +54,17 @@ def alike(residuals, **settings):
 @pytest.mark.parametrize("seed", range(4))
 def test_sets_that_fit_equally_are_found_from_bound_to_bound(seed):
     found = alike(sums, candidates=500, drawn=100, runs=2, population=20, seed=seed)
-    # From the truth along FREE, until the first parameter is at a bound.
+    # From the truth along FREE, until one parameter reaches a bound.
     ways = np.concatenate([-TRUTH / FREE, (1.0 - TRUTH) / FREE])
     ends = TRUTH + np.outer([np.max(ways[ways < 0]), np.min(ways[ways > 0])], FREE)
-    # Steps end where a half of the smallest one is too far.
+    # A walk ends before the bound when its smallest step would be too far.
     assert np.all(np.ptp(found, axis=0) > 0.8 * np.ptp(ends, axis=0))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_determined_stays_narrow(seed):
     found = alike(each, candidates=500, drawn=100, runs=2, population=20, seed=seed)
-    # One unit of misfit is 2 (sqrt(1 + r^2) - 1) = 1; the best one is not the truth itself.
+    # One unit of misfit is 2 (sqrt(1 + r^2) - 1) = 1; the best candidate is not the truth itself.
     reach = np.sqrt(1.5**2 - 1.0) / WIDTHS
     assert np.all(np.ptp(found, axis=0) < 2.5 * reach)
 
@@ -79,7 +79,7 @@ def test_a_search_tries_no_more_candidates_than_it_is_granted(candidates, residu
     part = budget_of(Search(**settings), 3)
     assert part.bred + part.last == candidates - 60
     moved = (run == STEPS_ALONE).sum()
-    # Once at least, where there is enough for four steps of each.
+    # The steps are made at least once if the candidates suffice for four per direction.
     assert moved >= 1 + 6 * part.rungs if part.looked else moved == 0
     assert part.looked == (candidates >= 250)
     if residuals is sums and part.looked:
@@ -165,12 +165,12 @@ def test_three_lengths_of_a_piecewise_linear_pair_are_not_determined(tmp_path):
     rows = re.findall(r"^(load|half_backlash|pitch_error_amplitude) (.*)$", ended.out, re.M)
     told = {name: text for name, text in rows if "not determined" in text}
     assert [*told] == ["load", "half_backlash", "pitch_error_amplitude"]
-    # The three of the best set, all multiplied by one factor, do the same.
+    # The three parameters of the best set, all multiplied by one factor, have the same misfit.
     best = tried["values"][np.argmin(tried["misfit"])]
     factors = 2.0 ** np.arange(-3.0, 4.0)
     scaled = {name: factor * factors for name, factor in zip(told, best, strict=True)}
     assert judge(problem, 0, scaled)["misfit"] == pytest.approx(tried["misfit"].min(), abs=1e-9)
-    # The row has the range of one that moves alone, and that of all that fit.
+    # The row has the range of the parameter that moves alone, and its range over all fitting sets.
     alone_low, alone_high, low, high = map(float, told["load"].split()[:4])
     assert np.log(high / low) > 3.0 * np.log(alone_high / alone_low)
     assert "flat over" in ended.out

@@ -1,4 +1,4 @@
-"""How orbits lose stability: by their multipliers, and at the bifurcations of Pan 2021's pair."""
+"""Orbits lose stability as their multipliers predict, also at bifurcations of Pan 2021's pair."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ WAYS = {
     "lower period 1 ends": (1.03, 2.0, 1, StabilityLoss.FOLD),
     "upper period 1 ends downwards": (1.07, 0.7, 1, StabilityLoss.FOLD),
     "period 3 ends": (12.97, 13.1, 3, StabilityLoss.FOLD),
-    "upper period 1 goes on": (1.07, 3.0, 1, StabilityLoss.STAYS_STABLE),
+    "upper period 1 continues": (1.07, 3.0, 1, StabilityLoss.STAYS_STABLE),
     "period 2 ends in period 1": (10.6, 10.2, 2, StabilityLoss.PERIOD_HALVING),
 }
 NAMES = list(WAYS)
@@ -72,17 +72,17 @@ def followed(begin) -> Followed:
         ([0.5, 0.2], [np.nan, np.nan], StabilityLoss.NOT_FOLLOWED, np.nan),
         ([-0.99, 0.5], [np.nan, np.nan], StabilityLoss.NOT_FOLLOWED, np.nan),
         ([0.7 + 0.7j, 0.7 - 0.7j], [np.nan, np.nan], StabilityLoss.NOT_FOLLOWED, np.nan),
-        # The multiplier that reaches +1 need not be the largest before.
+        # The multiplier that reaches +1 need not be the largest one before.
         ([-0.98, 0.97], [np.nan, np.nan], StabilityLoss.FOLD, 0.97),
         ([np.nan, np.nan], [np.nan, np.nan], StabilityLoss.NOT_FOLLOWED, np.nan),
         ([np.nan, np.nan], [-1.01, 0.5], StabilityLoss.NOT_FOLLOWED, np.nan),
-        # An unstable orbit of another branch, and such that are unstable in a way of their own.
+        # An unstable orbit of another branch, and orbits that are unstable for another reason.
         ([0.2, 0.1], [2.69, 0.0], StabilityLoss.UNCONFIRMED, 2.69),
         ([-0.8, 0.5], [-1.01, 0.5], StabilityLoss.UNCONFIRMED, -1.01),
         ([-0.99, 0.5], [-1.2, 0.5], StabilityLoss.UNCONFIRMED, -1.2),
         ([-0.99, 0.5], [1.01, 0.5], StabilityLoss.UNCONFIRMED, 1.01),
         ([0.99, 0.5], [0.8 + 0.7j, 0.8 - 0.7j], StabilityLoss.UNCONFIRMED, 0.8 + 0.7j),
-        # The multiplier that leaves need not be the largest before.
+        # The multiplier that leaves the unit circle need not be the largest one before.
         ([-0.99, 0.98], [1.01, -0.99], StabilityLoss.FOLD, 1.01),
     ],
 )
@@ -109,7 +109,7 @@ def test_orbits_of_pan_2021_lose_stability_in_these_ways(followed):
 def test_the_brackets_are_as_narrow_as_wanted_and_stable_on_one_side(followed):
     assert np.all(np.abs(followed.beyond_value - followed.stable_value) <= WIDTH)
     assert np.all(np.abs(followed.stable.multipliers) < 1.0)
-    stays = NAMES.index("upper period 1 goes on")
+    stays = NAMES.index("upper period 1 continues")
     assert followed.stable_value[stays] == followed.beyond_value[stays] == LAST[stays]
 
 
@@ -118,7 +118,7 @@ def test_every_loss_has_a_multiplier_on_the_unit_circle_on_both_sides(followed):
     inside, outside = (side.multipliers[lost, 0] for side in (followed.stable, followed.beyond))
     assert np.all(np.abs(inside) < 1.0)
     assert np.all(np.abs(outside) >= 1.0)
-    # The steepest doubling moves by 1 over 0.01.
+    # At the steepest doubling, the multiplier changes by 1 over 0.01.
     assert np.abs(inside - outside).max() < 100.0 * WIDTH < CONFIRMED
     assert followed.multiplier[FOLDS] == pytest.approx(1.0, rel=0, abs=2e-6)
 
@@ -194,7 +194,7 @@ def test_a_multiplier_nears_one_like_the_root_of_the_distance_from_a_fold(follow
     largest = np.max(np.where(multipliers.imag == 0.0, multipliers.real, 0.0), axis=1)
     margins = np.log(1.0 - largest).reshape(-1, distances.size)
     exponents = np.diff(margins, axis=1) / np.diff(np.log(distances))
-    # What the exponents lack of their limit falls like the root of the distance as well.
+    # The difference of the exponents from their limit also falls like the root of the distance.
     ratio = 3.0**-0.5
     limit = (exponents[:, 1] - ratio * exponents[:, 0]) / (1.0 - ratio)
     assert np.all(np.abs(exponents[:, 1] - 0.5) < np.abs(exponents[:, 0] - 0.5))
@@ -203,7 +203,7 @@ def test_a_multiplier_nears_one_like_the_root_of_the_distance_from_a_fold(follow
 
 @pytest.mark.parametrize("name", ["lower period 1 ends", "period 3 ends"])
 def test_beyond_a_fold_newton_takes_no_step_that_hardly_helps(followed, begin, name):
-    """A quarter of a step must take an eighth off the return distance, a longer one more."""
+    """A quarter of a step must reduce the return distance by an eighth, a longer step by more."""
     lane = NAMES.index(name)
     there, period = followed.stable_value[lane], int(PERIODS[lane])
     before = followed_from(begin[[lane]], [period], [FIRST[lane]], [there - 1e-3])
@@ -217,7 +217,7 @@ def test_beyond_a_fold_newton_takes_no_step_that_hardly_helps(followed, begin, n
     assert not found.converged.any()
     unmoved = np.isclose(left, 1.0, rtol=0, atol=1e-12)
     assert np.all((left < 0.875) | unmoved)
-    # Some do move, and those far beyond the fold do not.
+    # Some guesses move; those far beyond the fold do not.
     assert unmoved[-1] and not unmoved.all()
 
 

@@ -1,4 +1,4 @@
-"""Friction between the teeth in a configuration, and in the sweep that it describes."""
+"""Friction between the teeth in a configuration and in its sweep."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -40,9 +40,9 @@ PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
 
 
 def settled(phase_deg: float) -> np.ndarray:
-    """Return delta_5 and its rate at mesh phase 0 of the one motion that repeats.
+    """Return delta_5 and its rate at mesh phase 0 of the only periodic motion.
 
-    delta_5'' = f_n - (1 - s mu lambda) (delta_5 + 2 xi delta_5') in either half of the period.
+    delta_5'' = f_n - (1 - s mu lambda) (delta_5 + 2 xi delta_5') in each half of the period.
     """
     period, pitch_point, flow = 2.0 * np.pi / 0.9, phase_deg / 360.0, np.eye(3)
     changes = np.array([pitch_point, pitch_point + 0.5]) % 1.0
@@ -58,7 +58,7 @@ def test_a_sweep_settles_on_the_motion_of_the_exact_equations():
     result = gearchaos.run(Configuration.from_toml(SPUR))
     wanted = np.array([settled(phase) for phase in (0.0, 33.0, 180.0, 301.0)])
     for column, name in enumerate(("section_delta_5", "section_delta_5_rate")):
-        # The free motion has shrunk by exp(-0.05 tau), and the steps are right to order 4.
+        # The free motion has decayed by exp(-0.05 tau); the method has order 4.
         assert result[name][:, -1] == pytest.approx(wanted[:, column], rel=0, abs=1e-6)
     assert np.ptp(wanted[:, 0]) > 0.01
 
@@ -110,7 +110,7 @@ def test_friction_without_a_coefficient_names_the_keys_that_give_it():
 
 
 def test_the_sum_of_exponents_is_not_given_where_it_depends_on_phases_of_contact():
-    """A damper that acts in contact only has another share in it where friction pushes or pulls."""
+    """The share of a damper that acts in contact only depends on the direction of friction."""
     system = Lanes(Configuration.from_toml(SPUR, "spur.toml")).system_of(np.array([0, 1]))
     assert np.isfinite(sum_of_exponents(system)).all()
     text = SPUR.replace("[scene]", "half_backlash = 1.0\n[scene]")

@@ -1,4 +1,4 @@
-"""Bad input by the hundred: no traceback, no hang, no lost file, a message and code 2 or 4."""
+"""Hundreds of bad inputs cause a message and code 2 or 4, no traceback, hang or lost file."""
 
 from collections import Counter
 from pathlib import Path
@@ -18,7 +18,7 @@ from .fuzz_cases import (
 from .fuzz_results import LANES, damaged_result, good_result
 
 DRAWN = ("words of a later version", "forty nested fractions", "an axis to 1.7e308", "long texts")
-"""Forgeries that were a matter of drawing."""
+"""Forgeries that affect the drawing of figures."""
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,8 @@ def test_whatever_a_result_lacks_ends_in_a_sentence(tmp_path):
         assert said[part, command].code == 4, part
         assert words in said[part, command].said, part
     assert said["/ title", "response"].code == 0
-    # Else the first lack would hide the others; only one of the datasets here has an origin.
+    # If a missing wording were an error, the first one would hide the others. A missing origin is
+    # an error, but only one of the datasets here has an origin.
     codes = {key: said[f"every {key}", "plot"].code for key in WORDINGS}
     assert codes == {**dict.fromkeys(WORDINGS, 0), "origin": 4}
 
@@ -105,7 +106,7 @@ def virtual_dataset(file):
 
 @pytest.mark.parametrize("elsewhere", [external_link, external_storage, virtual_dataset])
 def test_numbers_kept_in_another_file_are_not_fetched(elsewhere, tmp_path):
-    # What is pointed to would do: a reader that followed it would accept the file.
+    # The other file has valid numbers: a reader that fetched them would accept the result.
     good_result(tmp_path / "good.h5")
     (tmp_path / "elsewhere.bin").write_bytes(bytes(LANES))
     path = tmp_path / "pointing.h5"

@@ -1,4 +1,4 @@
-"""Gears by their drawing data: pairs with profile shift, trains by module, and contradictions."""
+"""Gears from drawing data: pairs with profile shift, trains by module, and contradictions."""
 
 from pathlib import Path
 
@@ -58,7 +58,7 @@ def test_the_stiffness_of_a_pair_follows_its_profile_shift():
     assert harmonics(same) == pytest.approx(expected, abs=1e-12)
     given = pair(centre_distance_mm=distance, contact_ratio=float(ratios[0]))
     assert harmonics(given) == pytest.approx(expected, abs=1e-12)
-    # The lever of friction is that of the working pitch circles.
+    # The lever of friction follows from the working pitch circles.
     lever = system_of(given, SPEED).groups.friction_lever
     tangent = np.tan(shifted.working_pressure_angle) / np.cos(shifted.base_helix_angle)
     assert lever == pytest.approx(tangent, rel=1e-12)
@@ -118,7 +118,7 @@ SIZES = {"normal_module_mm": 2.166, "helix_angle_deg": 20.0, "face_width_mm": 15
 
 
 def train(pinion, wheel, mesh=(), sweep=("operation.speed_rpm", [1000.0, 2000.0])):
-    """Return a train with the teeth of the pair of Pan 2021."""
+    """Return a train with the numbers of teeth of the pair of Pan 2021."""
     tables = gearchaos.load_config(SWEEPS / "bearing_clearance.toml").tables()
     tables["gear"] = {
         "pinion": {"shaft": "input", "teeth": 21, **dict(pinion)},
@@ -133,7 +133,7 @@ def train(pinion, wheel, mesh=(), sweep=("operation.speed_rpm", [1000.0, 2000.0]
 def test_a_train_by_module_has_the_radii_and_the_contact_ratios_of_the_pair():
     machine = train(SIZES, {}).machine({})
     reference = pan_2021_pair()
-    # The input rotates uniformly; the wheel is held back by its base radius, in mm.
+    # The input rotates uniformly; the wheel acts on the gap by its base radius, in mm.
     assert machine.gap[0, 0] == pytest.approx(-1e3 * reference.base_radii[1], rel=1e-12)
     waves = machine.contact_stiffness[0, 1:].reshape(-1, 2) / machine.contact_stiffness[0, 0]
     ratios = reference.transverse_contact_ratio, reference.overlap_contact_ratio

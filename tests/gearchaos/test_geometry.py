@@ -117,7 +117,7 @@ def test_profile_shifted_pairs_of_a_textbook(catalogue, angle_deg, distance_mm, 
     pair = pan_2021_pair(normal_module=3e-3, **catalogue)
     assert np.degrees(pair.working_pressure_angle) == pytest.approx(angle_deg, abs=1e-4)
     assert 1e3 * pair.working_centre_distance == pytest.approx(distance_mm, abs=6e-4)
-    # Printed as sums of a diameter and two addenda, each with three decimals.
+    # The printed values are sums of a diameter and two addenda, each with three decimals.
     assert 2e3 * np.array(pair.tip_radii) == pytest.approx(tips_mm, abs=1.5e-3)
 
 
@@ -127,7 +127,7 @@ def test_the_sum_of_the_shifts_follows_from_the_working_angle():
     total = involute(working) - involute(alpha)
     total *= sum(pair.teeth) / (2.0 * np.tan(pair.normal_pressure_angle))
     assert total == pytest.approx(0.55, abs=1e-12)
-    # The same pair by its centre distance and its tip circles.
+    # The same pair is given by its centre distance and its tip circles.
     tips = tuple(2.0 * radius for radius in pair.tip_radii)
     same = pan_2021_pair(centre_distance=pair.working_centre_distance, tip_diameters=tips)
     assert same.working_pressure_angle == pytest.approx(working, abs=1e-13)
@@ -149,7 +149,7 @@ def test_shifts_that_cancel_keep_the_standard_centre_distance():
 def test_the_path_of_contact_ends_where_the_tip_circles_cut_the_line_of_action():
     pair = pan_2021_pair(profile_shift=(0.4, 0.15))
     distance, working = pair.working_centre_distance, pair.working_pressure_angle
-    # Centres at 0 and `distance`; the line of action touches the base circle of the first one.
+    # The centres are at 0 and `distance`; the line of action touches the first base circle.
     foot = pair.base_radii[0] * np.array([np.cos(working), np.sin(working)])
     along = np.array([np.sin(working), -np.cos(working)])
     ends = []

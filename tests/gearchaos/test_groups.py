@@ -1,4 +1,4 @@
-"""The dimensionless groups, derived, given and by default."""
+"""Dimensionless groups are derived, given, or set by default."""
 
 import pickle
 
@@ -11,7 +11,7 @@ from gearchaos.models.gear_pair.groups import resolve_groups
 from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS
 
 MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
-EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test
+EQUIVALENT_MASS = 0.095448  # kg, with the digits of the test of the geometry
 ALL_EFFECTS = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial", "friction")
 
 
@@ -78,7 +78,7 @@ PHYSICAL = {
 
 
 def physical(**changes):
-    """Return the physical data with changes, a dot written as two underscores."""
+    """Return the physical data with changes; a key has __ in place of a dot."""
     by_path = {path.replace("__", "."): value for path, value in changes.items()}
     assert by_path.keys() <= PHYSICAL.keys()
     return PHYSICAL | by_path
@@ -216,11 +216,11 @@ def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):
 @pytest.mark.parametrize("helix_angle", [0.0, 15.0, 20.0, 30.0])
 def test_a_backlash_is_the_same_in_whatever_plane_it_is_measured(helix_angle):
     alpha_n, beta = np.radians(20.0), np.radians(helix_angle)
-    # Base helix angle of the basic rack; and j_bn = j_t cos(alpha_n) cos(beta) of ISO 21771.
+    # Cosine of the base helix angle; j_bn = j_t cos(alpha_n) cos(beta) according to ISO 21771.
     cosine = np.sqrt(1.0 - (np.sin(beta) * np.cos(alpha_n)) ** 2)
     circumferential = 100.0
     normal = circumferential * np.cos(alpha_n) * np.cos(beta)
-    # Along the transverse line of action a gear turns through j_t cos(alpha_t) = j_bn / cosine.
+    # Along the transverse line of action: 2 half cosine = j_t cos(alpha_t) = j_bn / cosine.
     half = 0.5 * normal / cosine / cosine
     given = {"mesh__length_scale_um": 40.0, "pair__helix_angle_deg": helix_angle}
     for name, value in {
@@ -238,7 +238,7 @@ def test_a_backlash_is_the_same_in_whatever_plane_it_is_measured(helix_angle):
 def test_a_spur_pair_has_the_backlash_of_its_base_circle():
     spur = {"pair__helix_angle_deg": 0.0, "mesh__half_backlash_um": None}
     groups = resolve_groups(physical(**spur, mesh__normal_backlash_um=50.0), {})
-    # Half of it is the length scale, and the load is counted in that.
+    # Half of the backlash is the length scale, which also scales the load.
     assert groups.half_backlash == 1.0
     half = resolve_groups(physical(pair__helix_angle_deg=0.0, mesh__half_backlash_um=25.0), {})
     assert groups.load == pytest.approx(half.load, rel=1e-15)
@@ -246,7 +246,7 @@ def test_a_spur_pair_has_the_backlash_of_its_base_circle():
 
 def test_a_trapezoid_comes_from_the_contact_ratios_of_the_pair():
     groups = resolve_groups(physical(**trapezoid()), {})
-    # The exact contact ratios are 1.5050 and 0.7539, near the 1.5 and 0.75 behind Table 2.
+    # The exact contact ratios are 1.5050 and 0.7539; Table 2 is based on 1.5 and 0.75.
     assert groups.stiffness_cosine.size == 6
     assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, rel=0.05)
 

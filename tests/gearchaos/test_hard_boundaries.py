@@ -38,7 +38,7 @@ def places(curve, kind):
 
 
 def second_compound(matrix):
-    """Return the minors of two rows and two columns; its eigenvalues are products of pairs."""
+    """Return the matrix of the 2 x 2 minors; its eigenvalues are products of two eigenvalues."""
     first, second = np.triu_indices(len(matrix), 1)
     rows = matrix[first], matrix[second]
     return rows[0][:, first] * rows[1][:, second] - rows[0][:, second] * rows[1][:, first]
@@ -63,7 +63,7 @@ def test_every_curve_ends_for_a_reason():
 
 
 def test_curves_do_not_depend_on_how_far_ahead_points_are_searched(monkeypatch):
-    # Two grazing curves come close to each other; longer steps led from one to the other.
+    # Two grazing curves come close to each other; longer steps could jump between them.
     monkeypatch.setattr(boundary_following, "MOST_AHEAD", 4)
     found = find_boundaries(coarse_map(gearchaos.load_config(MAP))).boundaries
     assert [(one.kind, one.ends) for one in found] == [(one.kind, one.ends) for one in boundaries()]
@@ -79,7 +79,7 @@ def test_curves_of_pairs_end_at_the_resonances_of_folds():
 
 
 def test_a_curve_turns_sharply_between_two_resonances():
-    # Its radius of curvature is 2e-5 there, in shares of the ranges and scales of the states.
+    # The radius of curvature is 2e-5 there, relative to the ranges and the scales of the states.
     turn, width = np.array([0.6130438, 7.4199]), np.array([1e-5, 1e-3])
     near = [(np.abs(one.values - turn) < width).all(axis=1) for one in curves(NEIMARK_SACKER)]
     (number,) = [at for at, some in enumerate(near) if some.any()]
@@ -106,14 +106,14 @@ def test_a_curve_that_reaches_a_grazing_says_so_where_maps_need_shorter_steps():
     end = curve.values[0 if curve.ends[0] == CORNER else -1]
     meetings = [places(one, GRAZING_FLIP) for one in curves(GRAZING)]
     away = np.abs(np.concatenate(meetings) - end).max(axis=1)
-    # Beside the square root of a grazing the last 40 points cover less than 0.001.
+    # Near a grazing, where maps have a square root, the last 40 points cover less than 0.001.
     assert away.min() < 1e-5
 
 
 @pytest.mark.parametrize(
     ("kind", "meeting", "place"),
     [
-        # Of an independent integration: on one side of the grazing only.
+        # From an independent integration, on one side of the grazing only.
         (NEIMARK_SACKER, GRAZING_NEIMARK_SACKER, (0.723330489, 13.695652174)),
         (PERIOD_DOUBLING, GRAZING_FLIP, (0.70654297, 13.43810898)),
     ],
@@ -123,7 +123,7 @@ def test_a_curve_between_two_points_of_a_grazing_is_found(kind, meeting, place):
     meetings = np.concatenate([places(one, meeting) for one in curves(GRAZING)])
     for end in curve.values[[0, -1]]:
         assert np.abs(meetings - end).max(axis=1).min() < 1e-4
-    # Its points lie as close as lines between them need.
+    # Its points are so close that the lines between them are accurate.
     line = curve.values
     step, away = np.diff(line, axis=0), np.array(place) - line[:-1]
     share = np.clip(np.sum(away * step, axis=1) / np.sum(step**2, axis=1), 0.0, 1.0)

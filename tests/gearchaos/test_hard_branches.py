@@ -72,7 +72,7 @@ BASE = {
     "count": 7,
 }
 HUMPS = BASE | {"stiffness": 1.0, "damping": 0.2, "frequency": 0.9, "stop": 0.5}
-"""The motion has two maxima in a period, which only the first force tells apart."""
+"""The motion has two maxima in a period, which differ only by the first force."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Parameters are found again from what was observed, also after a search was stopped."""
+"""A search recovers known parameters from observations, also after it was stopped."""
 
 import math
 from contextlib import chdir, redirect_stderr, redirect_stdout
@@ -46,7 +46,7 @@ recorded_periods = 48
 
 
 def acceleration(pitch_error: float) -> float:
-    """Amplitude of the acceleration of a linear oscillator, which the pitch error drives."""
+    """Return the acceleration amplitude of a linear oscillator that the pitch error drives."""
     drive = FREQUENCY**2 * pitch_error * AMPLITUDE
     return FREQUENCY**2 * drive / abs(1.0 - FREQUENCY**2 + 2j * DAMPING * FREQUENCY)
 
@@ -106,7 +106,7 @@ class Identified:
 
 
 def command(folder, *arguments):
-    """Run the command in this process, which has imported what it needs."""
+    """Run the command in this process, which has already imported its modules."""
     out, err = StringIO(), StringIO()
     with chdir(folder), redirect_stdout(out), redirect_stderr(err):
         code = main(["targets.toml", *arguments])
@@ -124,7 +124,7 @@ def identified(tmp_path_factory):
 
 
 def numbers(path):
-    """All lines of a file but the first, which tells when and where it was written."""
+    """Return all lines of a file except the first, which has the time and place of writing."""
     return path.read_text().splitlines()[1:]
 
 
@@ -140,23 +140,23 @@ class TestALinearPair:
     def test_its_damping_and_its_error_are_found_again(self, identified):
         tried, _ = tried_of(identified)
         best = int(np.argmin(tried["misfit"]))
-        # 2 (sqrt(1 + r^2) - 1) of each observation is at most the misfit.
+        # The part 2 (sqrt(1 + r^2) - 1) of each observation is at most the misfit.
         widths = math.sqrt((1.0 + tried["misfit"][best] / 2.0) ** 2 - 1.0)
         assert widths < 1.0
-        # The length of a tangent vector goes up and down by less than the damping, as a share; the
-        # weights of the 48 periods, at most 2/48, rise to that and fall again.
+        # The length of a tangent vector oscillates by a share that is less than the damping. The
+        # weights of the 48 periods rise to at most 2/48 and fall again.
         swinging = DAMPING * 2.0 * (2.0 / 48.0) / (2.0 * math.pi / FREQUENCY)
         off = widths * EXPONENT_WIDTH + swinging
         assert tried["values"][best, 0] == pytest.approx(DAMPING, abs=off)
-        # The largest of 240 samples a period is at most this share below the crest; the gain
-        # changes with the damping by less than the damping does.
+        # The largest of 240 samples per period is at most this share below the crest. The relative
+        # change of the gain is less than that of the damping.
         crest = 1.0 - math.cos(math.pi / 240.0)
         share = crest + off / DAMPING
         share += widths * INCREMENT_WIDTH / (acceleration(3.0) - acceleration(1.0))
         assert tried["values"][best, 1] == pytest.approx(AMPLITUDE, rel=share)
 
     def test_every_candidate_is_kept(self, identified, monkeypatch):
-        # However many motions are looked at together.
+        # The result does not depend on how many motions are evaluated together.
         monkeypatch.setattr(evaluation, "MOTIONS_AT_ONCE", 3)
         tried, facts = tried_of(identified)
         some = {
@@ -174,7 +174,7 @@ class TestALinearPair:
         found = reach(tried, budget_of(problem_of(identified).targets.search, 2).rungs)
         best = tried["values"][np.argmin(tried["misfit"])]
         assert np.all(found.alone[:, 0] < best) and np.all(best < found.alone[:, 1])
-        # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.
+        # The misfit is at least the part 2 (sqrt(1 + r^2) - 1) of the exponent; it may grow by one.
         limit = 1.0 + max(found.surroundings, tried["misfit"].min())
         most = EXPONENT_WIDTH * math.sqrt((1.0 + limit / 2.0) ** 2 - 1.0)
         assert found.alone[0, 1] - best[0] < 2.0 * most
@@ -202,7 +202,7 @@ class TestASearchThatWasStopped:
         problem, (whole, _) = problem_of(identified), tried_of(identified)
         for name in ("pair.toml", "targets.toml"):
             (tmp_path / name).write_text((identified.folder / name).read_text())
-        # As a killed process leaves it: whole pieces, in the middle of a run.
+        # A killed process leaves such a file: whole pieces, in the middle of a run.
         first = whole[: 40 + 12 * 7]
         facts = decisive_facts(problem)
         write_tried(tmp_path / "targets.csv", first, problem, facts)
@@ -219,7 +219,7 @@ class TestASearchThatWasStopped:
             (tmp_path / name).write_text((identified.folder / name).read_text())
         with monkeypatch.context() as interrupted:
             for _ in range(2):
-                # The second time before the known ones are all taken up.
+                # The second interrupt comes before the search has reused all known candidates.
                 pieces = iter(range(9 if (tmp_path / "targets.csv").exists() else 0, 100))
                 interrupted.setattr(searching, "check", check)
                 ended = command(tmp_path, "--resume")
@@ -353,7 +353,7 @@ def test_bounds_with_which_the_steps_are_unstable_are_refused(identified):
     problem = load_targets(identified.folder / "targets.toml", [few])
     exact = problem.config.replace("integration.method", "flow_map")
     require_stable(exact, np.array([1.0]), problem.targets.corners())
-    # Left out, they are those that a search takes by default.
+    # Without this key, the steps are those that a search takes by default.
     free = problem.config.replace("integration.steps_per_period", None)
     require_stable(free, np.array([1.0]), problem.targets.corners())
 

@@ -1,4 +1,4 @@
-"""What a sweep finds depends neither on what else it records nor on the steps of exact methods."""
+"""Recorded outputs, and the steps of exact methods, do not change the results of a sweep."""
 
 from functools import cache
 
@@ -26,9 +26,9 @@ EVERYTHING = (
     "outputs.exponents=true",
 )
 ROUNDING = 1e-9
-"""A chaotic lane is among them, on which rounding grows."""
+"""Tolerance relative to the largest value: one lane is chaotic and amplifies rounding errors."""
 SAMPLED = ("force_", "gap_", "x1_", "orbit_", "amplitude_")
-"""Loads, extremes and amplitudes, which samples along a step approach."""
+"""Prefixes of loads, extremes and amplitudes: samples along a step only approximate them."""
 
 
 @cache
@@ -59,7 +59,7 @@ def test_what_is_recorded_does_not_change_what_is_found(method, outputs):
 def test_exact_methods_find_the_same_with_any_steps(method, steps):
     found = result(method, *CONTACT, f"integration.steps_per_period={steps}")
     assert_alike(found, result(method, *CONTACT))
-    # Crossings are exact, so that the record of a long sweep is one of contact, not of steps.
+    # Crossings are exact: the record of a long sweep depends on the contact, not on the steps.
     assert found["crossings_per_period"].max() > 1.0
 
 

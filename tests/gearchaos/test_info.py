@@ -1,4 +1,4 @@
-"""What the info command says about a result file."""
+"""The info command describes a result file."""
 
 import json
 import re
@@ -96,7 +96,7 @@ def test_arrays_that_are_damaged_are_named(good):
     ended = info(good, "--verify")
     assert (ended.code, ended.out) == (4, "")
     assert "its checksum does not fit" in ended.err
-    # Neither does it pass without, or under a new, checksum of the whole.
+    # The damage is also found without the checksum of the whole file, and with a new one.
     good.write_bytes(content[:-CHECKSUM_LINE])
     assert "damaged in section_delta_5" in info(good, "--verify").err
     append_checksum(good)
@@ -112,9 +112,9 @@ def test_a_newer_format_is_refused_in_a_sentence(good):
     assert "has version '4.0' of the file format; this gearchaos reads 3.x" in ended.err
 
 
-@pytest.mark.skipif(not Path("/proc/self/mem").is_file(), reason="there is no such file")
+@pytest.mark.skipif(not Path("/proc/self/mem").is_file(), reason="/proc/self/mem does not exist")
 def test_a_file_that_cannot_be_read_is_named_in_our_own_words(tmp_path):
-    # Not even the superuser reads the beginning of this one.
+    # Even the superuser cannot read the beginning of this file.
     ended = run_module("gearchaos.info", "--verify", "/proc/self/mem", cwd=tmp_path)
     assert ended.code == 4
     assert "error: /proc/self/mem: cannot be read: " in ended.err.splitlines()[-1]

@@ -24,7 +24,7 @@ def test_every_grade_is_rounded_as_its_size_asks(grade, single, cumulative):
 
 
 def test_the_edition_of_1995_knows_ranges_and_that_of_2013_sizes():
-    # The upper end of a range belongs to it.
+    # A range includes its upper end.
     assert single_pitch_um(7, 3.5, 50.0) == single_pitch_um(7, 2.1, 21.0) == 11.0
     assert single_pitch_um(7, 2.0, 50.0) == 10.0
     assert cumulative_pitch_um(7, 0.5, 5.0) == cumulative_pitch_um(7, 2.0, 20.0)
@@ -36,7 +36,7 @@ def test_the_edition_of_1995_knows_ranges_and_that_of_2013_sizes():
 
 
 def test_the_finest_grade_is_0():
-    # Table 1 of the edition of 1995: 0.8 um for modules up to 2 mm and diameters up to 20 mm.
+    # Table 1 of the edition of 1995 has 0.8 um for modules up to 2 mm and diameters up to 20 mm.
     assert single_pitch_um(0, 1.0, 10.0) == 0.8
     assert single_pitch_um(5, 1.0, 10.0) == 4.7
 

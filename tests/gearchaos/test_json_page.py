@@ -17,7 +17,7 @@ from .commands import run_module, small_config
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 OPTIONAL = {"directions_apart", "boundaries", "zero_one"}
 OPTIONAL |= {"free_eigenfrequencies", "free_eigenfrequencies_Hz"}
-"""Keys of options and models that the sweep below does not have."""
+"""Keys of options and models that the sweep below does not use."""
 
 
 def listed(heading: str) -> set[str]:
@@ -28,7 +28,7 @@ def listed(heading: str) -> set[str]:
 
 
 def printed(facts: dict, listed_keys: set[str]) -> set[str]:
-    """Return the keys of an object as the page writes them, those of lists where it does."""
+    """Return the keys of an object as paths, with keys of list entries if the page lists them."""
     found = set()
     for key, value in facts.items():
         below = {one for one in listed_keys if re.match(rf"{key}(\[\])?\.[a-z]", one)}
@@ -42,13 +42,13 @@ def printed(facts: dict, listed_keys: set[str]) -> set[str]:
 
 
 def plain(keys: set[str]) -> set[str]:
-    """Return keys without what stands for names, values or entries of them."""
+    """Return keys without their placeholders for names, values or entries."""
     return {re.sub(r"(?<!\])\.[A-Z]+.*$|\[\]$|(?<=\w)\.NAME$", "", key) for key in keys}
 
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
-    """Every kind of JSON of a small sweep from three starts, by heading of the page."""
+    """Return every kind of JSON output of a small sweep from three starts, by heading."""
     folder = tmp_path_factory.mktemp("json")
     config = str(small_config(folder))
     keys = ("start.kind=random", "start.count=3", "sweep.count=3")

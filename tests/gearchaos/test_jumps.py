@@ -1,4 +1,4 @@
-"""A jump between two branches is found, and a branch that only bends is not one."""
+"""A jump between two branches is found; a bend of one branch is not a jump."""
 
 import json
 
@@ -15,14 +15,14 @@ VALUES = np.linspace(0.0, 1.0, 41)
 
 
 def section(*points: np.ndarray, times: int = 3) -> np.ndarray:
-    """One state of lanes that visit these points in turn."""
+    """Return a section with one state of lanes that visit these points in turn."""
     return np.tile(np.stack(points, axis=1), (1, times))[:, :, np.newaxis]
 
 
 def test_a_step_on_a_smooth_branch_is_a_jump():
     branch = np.sin(VALUES) + 0.3 * (VALUES > 0.5)
     assert np.flatnonzero(jump_sizes(np.full(41, 1), section(branch))).tolist() == [20]
-    # Two points of a period 2 may come in either order.
+    # The two points of a period-2 orbit may be in either order.
     other = np.cos(VALUES)
     swapped = np.where(VALUES > 0.25, branch, other), np.where(VALUES > 0.25, other, branch)
     assert np.flatnonzero(jump_sizes(np.full(41, 2), section(*swapped))).tolist() == [20]
@@ -32,8 +32,8 @@ def test_a_step_on_a_smooth_branch_is_a_jump():
     "branch",
     [
         VALUES**2,
-        np.sqrt(VALUES - VALUES[0]),  # Beginning at a fold.
-        np.sqrt(1.0 - VALUES),  # Ending at one.
+        np.sqrt(VALUES - VALUES[0]),  # Begins at a fold.
+        np.sqrt(1.0 - VALUES),  # Ends at a fold.
         np.tanh(30.0 * (VALUES - 0.51)),  # Steep, but resolved.
         np.zeros(41),
         1e-3 * np.random.default_rng(1).normal(size=41),
@@ -65,7 +65,7 @@ def test_only_motions_of_the_same_period_are_compared():
     period = np.where(VALUES > 0.5, 2, 1)
     assert not jump_sizes(period, section(branch)).any()
     assert not jump_sizes(np.zeros(41, int), section(branch)).any()
-    # A period that the section does not hold.
+    # The section has fewer points than the period.
     assert not jump_sizes(np.full(41, 4), section(branch)).any()
 
 
@@ -108,5 +108,5 @@ def test_neighbours_an_excitation_period_apart_have_not_jumped():
     result = gearchaos.run(gearchaos.load_config("sweeps/inspection.toml", overrides))
     assert result["period"].tolist() == [2] * 9
     apart = np.abs(result["section_delta_5"][1:, -1] - result["section_delta_5"][:-1, -1])
-    assert apart.max() > 0.02  # the starts lead to either half of the orbit
+    assert apart.max() > 0.02  # starts settle on either half of the orbit
     assert jumps(result) == []

@@ -1,4 +1,4 @@
-"""The lanes of Pan 2021 are labelled as what they are, and nothing else in a result changes."""
+"""Lanes of Pan 2021 get the correct labels; labels change only the exponents of orbits."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,8 @@ def test_the_motions_of_figure_7_are_labelled():
 
 
 def test_a_lane_that_settles_slowly_is_labelled_by_the_stable_orbit_it_comes_close_to():
-    # Just before the period doubling and just behind it; after ten times as long it has arrived.
+    # Just below and just above the period doubling; after a ten times longer transient the lanes
+    # have settled.
     arrays = computed(lanes_at(10.26, 10.27), 2)
     assert ((arrays["return_distance"] > 1e-5) & (arrays["return_distance"] < 1e-2)).all()
     longer = ("integration.transient_periods=8000",)
@@ -71,7 +72,7 @@ def test_a_lane_that_settles_slowly_is_labelled_by_the_stable_orbit_it_comes_clo
 
 @pytest.mark.parametrize(("multiplier", "motion"), [(0.995, PERIODIC), (0.99999, UNRESOLVED)])
 def test_an_orbit_that_hardly_attracts_is_found_by_a_longer_record(multiplier, motion):
-    # A linear oscillator: every disturbance shrinks by |mu| = exp(-zeta T) a period.
+    # In a linear oscillator every disturbance shrinks by |mu| = exp(-zeta T) per period.
     period = 2.0 * np.pi / 1.3717
     sweep = simulation(
         "sweep={parameter='load', values=[0.1, 0.2]}",
@@ -116,7 +117,7 @@ def test_the_label_looks_at_states_that_are_not_kept():
 
 @pytest.mark.parametrize("overrides", [(), RANDOM, ("start.carry=downwards",)])
 def test_labels_change_nothing_else_of_a_result_but_exponents_of_orbits(overrides):
-    # Without an odd lane out: labels come on top.
+    # Labels are added; all other arrays stay the same in every lane, except exponents of orbits.
     with_labels = computed(simulation(*overrides))
     without = computed(simulation(*overrides, "outputs.motion=false"))
     labels = {"motion", "period", "return_distance", "bands", "record"}
@@ -143,7 +144,7 @@ def test_the_exponent_of_a_periodic_lane_is_that_of_its_orbit():
 
 
 def test_a_record_that_holds_chaos_before_its_orbit_is_mixed():
-    # Chaos that ends within the record: the orbit is far outside of where the chaos was.
+    # Chaos ends within the record. The orbit lies far outside the region of the chaos.
     values = np.arange(14.6, 15.0, 0.01).round(3).tolist()
     arrays = computed(lanes_at(*values), len(values))
     mixed = arrays["record"] == MIXED
@@ -167,7 +168,7 @@ def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
     system, once = sweep.lanes.system_of(np.arange(41)), Plan(200, 0, 1, 0, tangent=True)
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((41, 10)), once))
     grows = np.max(np.abs(multipliers), axis=1) > 1.0
-    # About Omega = 2 / n lie the tongues of the Mathieu equation.
+    # The tongues of the Mathieu equation lie near Omega = 2 / n.
     assert 3 < grows.sum() < 38
     assert np.array_equal(arrays["motion"] == GROWS, grows)
     assert not np.isin(arrays["motion"], (CHAOTIC, QUASI_PERIODIC)).any()
@@ -175,7 +176,7 @@ def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
 
 
 def test_slow_growth_of_a_linear_scene_is_growth():
-    """At the edge of a tongue, where the largest multipliers are 0.9987 to 1.0027."""
+    """The lanes lie at the edge of a tongue; their largest multipliers are 0.9987 to 1.0027."""
     near = "sweep={parameter='mesh_frequency', values=[1.708, 1.709, 1.710, 1.711]}"
     file = PAN2021.with_name("pan2021_full.toml")
     sweep = plan_run(load_config(file, [*PARAMETRIC, near]))
@@ -199,7 +200,7 @@ def test_a_diverged_lane_is_labelled_as_diverged(tmp_path):
 
 
 def test_a_lane_too_fast_for_its_flow_maps_is_no_diverged_one(tmp_path):
-    # Twice as many would be more than are tried.
+    # Twice these steps would exceed the largest number of steps that is tried.
     how = ("integration.method=flow_map", "integration.steps_per_period=2100")
     arrays = computed(listing(tmp_path, "mesh_frequency", [1e-4, 0.8], *how))
     assert arrays["status"].tolist() == [Status.TOO_FAST, Status.OK]

@@ -1,4 +1,4 @@
-"""Who knows whom: results and figures work on a machine without the engine."""
+"""Packages import only lower layers; results and figures work without the engine."""
 
 import re
 import subprocess
@@ -14,7 +14,7 @@ from gearchaos.__main__ import COMMANDS
 ROOT = Path(__file__).resolve().parents[2]
 
 ENGINE = {"numba", "llvmlite", "gearchaos_kernels"}
-# With email, importlib.metadata: what takes time is imported where an interrupt is caught.
+# Importing importlib.metadata imports email. Slow imports are made where an interrupt is caught.
 HEAVY = ENGINE | {"numpy", "h5py", "matplotlib", "pydantic", "tqdm", "email", "inspect"}
 
 

@@ -1,4 +1,4 @@
-"""A process that runs and draws again and again keeps neither threads, files nor memory."""
+"""A process that runs and draws repeatedly leaks no threads, files or memory."""
 
 import gc
 import os
@@ -23,18 +23,20 @@ MEGABYTE = 1 << 20
 
 
 def memory() -> float:
-    """Return the memory of this process in MB, without what is only waiting to be collected."""
+    """Return the memory of this process in MB after a garbage collection."""
     gc.collect()
     pages = int((SELF / "statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / MEGABYTE
 
 
 def held() -> tuple[int, int]:
-    """Return how many threads and open files this process has."""
+    """Return the numbers of threads and open files of this process."""
     return len(os.listdir(SELF / "task")), len(os.listdir(SELF / "fd"))
 
 
-@pytest.mark.skipif(not SELF.exists(), reason="no /proc to count threads, files and memory in")
+@pytest.mark.skipif(
+    not SELF.exists(), reason="/proc is missing: threads, files and memory cannot be counted"
+)
 def test_many_runs_leave_threads_files_and_memory_where_they_were():
     config, threads_before = configuration(0, "sweep.count=2"), {*threading.enumerate()}
     for _ in range(3):
@@ -46,25 +48,25 @@ def test_many_runs_leave_threads_files_and_memory_where_they_were():
     threads, files = held()
     assert threads <= before[0]
     assert files <= before[1]
-    # 100 kB for every run.
+    # At most 100 kB per run.
     assert memory() - memory_before < 20.0
 
 
-@pytest.mark.skipif(not SELF.exists(), reason="no /proc to read the memory from")
+@pytest.mark.skipif(not SELF.exists(), reason="/proc is missing: memory cannot be read")
 def test_many_pages_leave_memory_where_it_was():
     result = logistic_sweep(np.linspace(2.8, 3.9, 31))
 
     def drawn(pages: int) -> list[weakref.ref]:
         return [weakref.ref(bifurcation_page(result)) for _ in range(pages)]
 
-    # What the collector has not seen yet is memory that the next pages use again.
+    # Later pages reuse memory that is not collected yet.
     drawn(15)
     before = memory()
     for _ in range(PAGES // 15):
         pages = drawn(15)
         now = memory()
         assert not any(page() for page in pages)
-    # A page takes 5 MB while it is there: a fifth of what all of them would take.
+    # A page takes 5 MB while it exists; the limit is a fifth of the memory of all pages.
     assert now - before < PAGES
 
 

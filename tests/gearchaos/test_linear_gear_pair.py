@@ -1,4 +1,4 @@
-"""A gear pair of ten states, written as a piecewise-linear machine, moves as the gear pair does."""
+"""A gear pair of ten states has the same motion when written as a piecewise-linear machine."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def as_machine(pairs):
     waves = 1 + 2 * len(orders)
 
     def wave(mean, sine):
-        """A mean and a sine of the mesh phase."""
+        """Return the waves of a mean and a sine of the mesh phase."""
         return np.stack([mean, nothing, sine, *[nothing] * (waves - 3)], axis=1)
 
     def diagonal(*names):
@@ -48,7 +48,7 @@ def as_machine(pairs):
         frequency=2.0 * np.pi / pairs.mesh_period,
         position=diagonal(*(name.format("stiffness") for name in bearings)),
         rate=diagonal(*(name.format("damping") for name in bearings)),
-        # The axial force acts on the axial coordinates alone.
+        # The axial force acts only on the axial coordinates.
         reaction=np.tile(np.array([[1, 1, 1, 0, 0], [0, 0, 0, 1, 1.0]]).T, (pairs.lanes, 1, 1)),
         gap=np.stack([row, axial - row], axis=1),
         force=force,
@@ -76,7 +76,7 @@ def test_a_gear_pair_as_a_machine_moves_as_the_gear_pair(method, in_contact):
         for system, state in ((pairs, start), (as_machine(pairs), start / scales))
     )
     assert (found.crossings == expected.crossings).all() and found.crossings.min() > 5
-    # The last lane is chaotic: it amplifies rounding, more so with less damping.
+    # The last lane is chaotic: it amplifies rounding errors, more with less damping.
     error = np.abs(found.section * scales[:, np.newaxis] - expected.section).max(axis=(1, 2))
     assert error[:-1].max() < 1e-12 and error[-1] < (1e-8 if in_contact else 1e-10)
     assert found.contact[:, :, :4] == pytest.approx(expected.contact[:, :, :4], abs=1e-8)

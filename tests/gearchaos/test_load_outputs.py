@@ -1,4 +1,4 @@
-"""The loads of a lane in a result: names, factors, and when they can be reported."""
+"""The loads of a lane in a result: names, factors, and conditions for reporting them."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_a_response_has_the_transmission_error_whose_statistics_a_sweep_reports(
     error = result["transmission_error"]
     assert np.abs(result["mesh_error"]).max() > 0.0
     np.testing.assert_allclose(error, result["delta_5"] + result["mesh_error"], atol=1e-14)
-    # Means are trapezoidal sums; extremes are those between the steps as well.
+    # Means are trapezoidal sums; extremes include values between the steps.
     mean = np.trapezoid(error) / (error.shape[1] - 1)
     square = np.trapezoid((error - mean[:, np.newaxis]) ** 2) / (error.shape[1] - 1)
     known = {"mean": mean, "rms": np.sqrt(square), "peak_to_peak": np.ptp(error, axis=1)}
@@ -67,7 +67,7 @@ def test_a_sweep_reports_them_and_its_file_keeps_them(tmp_path):
     both = simulation("outputs.loads=true", "outputs.contact=true")
     without = [variable.name for variable in variables_of(both)]
     assert {*without} == {name for name in result.variables if not name.endswith("_axial")}
-    # Over a record the mean force balances the load, but for what the mass still gains.
+    # Over a record the mean force balances the load, except for momentum that the mass gains.
     assert result["mesh_force_mean_tangential"] == pytest.approx(
         result["mesh_force_largest_tangential"] / result["load_factor_largest"], rel=0.1
     )
@@ -78,7 +78,7 @@ def test_a_sweep_reports_them_and_its_file_keeps_them(tmp_path):
     kept = gearchaos.open_result(next(tmp_path.glob("*.h5")))
     for name in names:
         assert np.array_equal(kept[name], result[name], equal_nan=True), name
-    # With extremes of a state: other tests have compiled this loop.
+    # Extremes of a state are recorded because other tests have already compiled this loop.
     more = "integration.method=flow_map", "outputs.states=['delta_5']"
     exact = gearchaos.run(load_config(PAN2021, (*asked, *more)))
     # The last two lanes are chaotic.

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent from growth rates whose mean is known."""
+"""The largest Lyapunov exponent follows from growth rates with a known mean."""
 
 import numpy as np
 import pytest
@@ -36,12 +36,12 @@ def test_a_single_period_gives_an_exponent_without_a_standard_error():
 
 def test_two_periods_give_a_standard_error():
     _, error = estimate(np.array([[0.5, 0.7]]))
-    # Half their difference, as wide as the quantile of t with one degree of freedom to first order.
+    # Half the difference, widened to the quantile of t for one degree of freedom, to first order.
     assert error == pytest.approx([2.25 * 0.1 / PERIOD])
 
 
 def quasi_periodic_error(periods: int) -> float:
-    """Largest error over many phases of a growth that swings about a mean of 0.01."""
+    """Return the largest error over many phases of a growth that oscillates about 0.01."""
     phase = np.linspace(0.0, 1.0, 64, endpoint=False)[:, np.newaxis]
     angle = 2.0 * np.pi * (GOLDEN * np.arange(periods) + phase)
     growth = 0.01 + np.cos(angle) + 0.5 * np.sin(2.0 * angle)
@@ -72,18 +72,18 @@ def test_standard_error_of_white_noise_is_calibrated(periods):
     exponent, error = estimate(growth)
     true_spread = np.std(exponent)
     z = (exponent - 0.4 / PERIOD) / error
-    # Of a normal distribution 95.4 %; 6000 lanes tell it to 0.3 %.
+    # A normal distribution has 95.4 % within two deviations; 6000 lanes resolve this to 0.3 %.
     assert np.mean(np.abs(z) < 2.0) == pytest.approx(0.954, abs=0.01)
-    # A little wider than the spread, since it is itself known from few blocks.
+    # The error is a little wider than the spread because it is estimated from few blocks.
     assert 1.0 < np.sqrt(np.mean(error**2)) / true_spread < 1.15
-    # sqrt(3/2) is the price of the smooth weights.
+    # The smooth weights increase the spread by the factor sqrt(3/2).
     assert true_spread * PERIOD == pytest.approx(np.sqrt(1.5 / periods), rel=0.05)
 
 
 def test_standard_error_of_correlated_growth_covers_it():
     rng = np.random.default_rng(3)
     noise = rng.standard_normal((4000, 1100))
-    # A memory of about five periods, as in a chaotic motion near a window.
+    # The growth has a memory of about five periods, as in a chaotic motion near a window.
     growth = np.zeros_like(noise)
     for period in range(1, noise.shape[1]):
         growth[:, period] = 0.8 * growth[:, period - 1] + noise[:, period]
@@ -111,14 +111,15 @@ def test_exponent_of_a_lane_does_not_depend_on_the_lanes_beside_it():
 
 
 def wandering(lanes: int, periods: int, memory: float) -> np.ndarray:
-    """Growth that is nearly white, with a slow part too small to see but half as important."""
+    """Return nearly white growth; a small slow part causes half the variance of the mean."""
     rng = np.random.default_rng(11)
     noise = rng.standard_normal((2, lanes, periods + 1000))
     keeps = np.exp(-1.0 / memory)
     slow = np.zeros((lanes, periods + 1000))
     for period in range(1, slow.shape[1]):
         slow[:, period] = keeps * slow[:, period - 1] + np.sqrt(1 - keeps**2) * noise[0, :, period]
-    # Its variance times twice its memory is that of the white part: together they count double.
+    # The variance of the slow part times twice its memory is the variance of the white part: both
+    # together double the variance of the mean.
     return 0.3 + noise[1, :, 1000:] + slow[:, 1000:] / np.sqrt(2.0 * memory)
 
 
@@ -132,7 +133,7 @@ def test_two_standard_errors_cover_an_exponent_whose_growth_remembers(periods):
     covered = [np.mean(np.abs(exponent - 0.3) <= 2.0 * error) for error in (blind, told[1])]
     assert covered[0] < 0.91
     assert covered[1] > 0.92
-    # As wide as Student's t with two waves asks for, and no wider.
+    # The error is as wide as Student's t with two waves requires, and no wider.
     assert np.median(told[1]) < 2.2 * np.std(exponent)
 
 
@@ -153,7 +154,7 @@ def test_blocks_longer_than_the_memory_are_left_alone():
     alone = largest_exponent(growth, one)[1]
     memory = np.linspace(40.0, 60.0, 50)
     error = largest_exponent(growth, one, memory)[1]
-    # An eighth of the record: 50 periods.
+    # Blocks are an eighth of the record: 50 periods.
     assert np.array_equal(error[memory <= 50.0], alone[memory <= 50.0])
     assert (error > alone)[memory > 50.0].mean() > 0.5
 

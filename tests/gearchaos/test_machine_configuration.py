@@ -1,4 +1,4 @@
-"""Machines from their matrices: what a file may say, and the message for what it may not."""
+"""Machines given by matrices: valid configurations, and messages for invalid ones."""
 
 import json
 import sys
@@ -60,7 +60,7 @@ def read(text, folder=None):
 def test_a_machine_that_cannot_be_is_refused_in_a_sentence(tmp_path, old, new, message):
     assert TEXT.count(old) >= 1
     if message is None:
-        # The stop alone holds the machine, which is enough.
+        # The stop alone holds the machine, which is sufficient.
         read(TEXT.replace(old, new, 1))
         return
     with pytest.raises(gearchaos.ConfigurationError) as refused:
@@ -70,7 +70,7 @@ def test_a_machine_that_cannot_be_is_refused_in_a_sentence(tmp_path, old, new, m
 
 
 def test_a_machine_that_is_unstable_is_computed_with_a_remark():
-    # A force that follows the motion makes one of the two modes grow.
+    # A follower force makes one of the two modes grow.
     text = TEXT.replace("[[1.0, -1.0], [-1.0, 2.0]]", "[[1.0, -1.0], [1.0, 2.0]]")
     text = text.replace("stiffness = 100.0", "stiffness = 0.01")
     config = read(text.replace("{ stiffness = 0.03 }", "[0.0, 0.0]"))
@@ -94,13 +94,13 @@ def test_a_matrix_may_be_a_file_and_an_element_an_entry_of_a_list(tmp_path):
     text = text.replace("[clearance.stop]", '[[clearance]]\nname = "stop"')
     config, given = read(text, str(tmp_path)), read(TEXT)
     assert config.model == given.model and config.clearance == given.clearance
-    # A result keeps the file, so that it can be read without it.
+    # A result keeps the content of the file, so that reading the result does not need the file.
     assert read(config.text).model == given.model
 
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
-    """The folder of a short sweep of the machine, up and down."""
+    """Return the folder of a short sweep of the machine in both directions."""
     folder = tmp_path_factory.mktemp("machine")
     (folder / "machine.toml").write_text(TEXT)
     short = [f"--set={path}={value}" for path, value in SHORT.items()]
@@ -130,7 +130,7 @@ def test_a_result_names_coordinates_and_elements(swept):
     assert {"x1", "x1_rate", "x1_acceleration", "force_stop", "contact_stop"} <= {*motion}
     ended = run_module("gearchaos.plot", "r.h5", "-o", "r.png", cwd=swept)
     assert ended.code == 0, ended.err
-    # What is drawn by default is the first coordinate.
+    # By default the first coordinate is drawn.
     axes = Figure().add_subplot()
     for draw in (figures.time_history, figures.phase_portrait, figures.amplitude_spectrum):
         draw(axes, motion, 0)
@@ -188,7 +188,7 @@ def test_any_number_of_a_machine_can_be_swept():
     result = gearchaos.run(config.replace("model.frequency", 0.5))
     section = result["section_x1"]
     assert section.shape[:2] == (2, 2)
-    # A stop that is never met leaves a linear machine, whose motion is proportional to the force.
+    # Without contact with the stop the machine is linear: the motion is proportional to the force.
     np.testing.assert_allclose(section[1, 1], 2.0 * section[0, 1], rtol=1e-9)
 
 

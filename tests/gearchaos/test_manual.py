@@ -1,6 +1,6 @@
-"""The manual: its links lead somewhere, its commands exist, and its pages run as they stand.
+"""The links of the manual work, its commands exist, and its pages run.
 
-What a page shows for thousands of lanes is run with a few of them and short records.
+Sweeps of thousands of lanes are run with few lanes and short records.
 """
 
 import importlib
@@ -29,12 +29,12 @@ PAGES = [*ROOT_PAGES, *sorted((CLONE / "docs").rglob("*.md"))]
 NAMES = [str(page.relative_to(CLONE)) for page in PAGES]
 SITE = run_path(str(CLONE / "docs" / "site" / "generated.py"))
 GENERATED = {*SITE["PAGES"]}
-"""Pages that exist on the site only: it makes them from the program."""
+"""Pages that exist only on the site, which generates them from the program."""
 
 SHORT = ("integration.transient_periods=40", "integration.recorded_periods=32")
 SHORT += ("outputs.section_points=8",)
 ALSO = {
-    # Whole cycles of a third of the mesh order, and of both gears.
+    # The record has whole cycles of a third of the mesh order, and of both gears.
     "orders.h5": ("integration.recorded_periods=30",),
     "sweeps/grades.toml": (
         *(
@@ -49,21 +49,21 @@ ALSO = {
     "sweeps/basins.toml": ("start.count=4",),
     "sweeps/speed_and_error.toml": ("sweep.count=3", "second_sweep.count=3"),
 }
-"""Settings of single sweeps, by their configuration or their output; others have five lanes."""
+"""Settings of single sweeps, by configuration or output file; other sweeps have five lanes."""
 
 TOO_LONG = {"reproduce", "identify", "control", "explore", "accuracy", "merge"}
-"""Commands whose own tests run them on small cases; here they are only read."""
+"""Commands that are only parsed here; their own tests run them on small cases."""
 
 RUN = ("docs/getting-started.md", "docs/gallery/README.md")
 RUN += tuple(name for name in NAMES if re.match("docs/how-to/(?!index|read)", name))
-"""Pages whose commands and Python blocks are run, in their order, in one folder each.
+"""Pages whose commands and Python blocks are run in order, each page in its own folder.
 
-`test_api_page` runs the Python blocks of the others.
+`test_api_page` runs the Python blocks of the other pages.
 """
 
 
 def words_of(page: Path) -> str:
-    """Return the text of a page, of a notebook that between its cells of code."""
+    """Return the text of a page; of a notebook, the text of its Markdown cells."""
     text = page.read_text(encoding="utf-8")
     if page.suffix != ".ipynb":
         return text
@@ -72,14 +72,14 @@ def words_of(page: Path) -> str:
 
 
 def blocks(name: str) -> list[tuple[str, str, str]]:
-    """Return language, text and the line before of every code block of a page."""
+    """Return language, text and preceding line of every code block of a page."""
     text = (CLONE / name).read_text(encoding="utf-8")
     found = re.finditer(r"^([^\n]*)\n\n```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     return [(one[2], one[3], one[1]) for one in found]
 
 
 def commands(text: str) -> list[list[str]]:
-    """Return the words of every command of gearchaos in a block of a shell."""
+    """Return the words of every gearchaos command in a shell block."""
     lines = text.replace("\\\n", " ").splitlines()
     parts = [part for line in lines for part in line.split(" && ")]
     found = []
@@ -98,7 +98,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def broken(page: Path) -> list[str]:
-    """Return the links and pictures of a page that lead to no file or no heading."""
+    """Return the links and pictures of a page whose file or heading does not exist."""
     text = re.sub(r"```.*?```|`[^`\n]*`", "", words_of(page), flags=re.DOTALL)
     wrong = []
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
@@ -191,7 +191,7 @@ def test_the_commands_of_a_page_are_those_of_the_program(name):
             if "--help" in words:
                 continue
             main = importlib.import_module(f"gearchaos.{command}").main
-            options, _ = main.parser().read(words)  # An option that does not exist is refused.
+            options, _ = main.parser().read(words)  # Unknown options are refused.
             ready = [CLONE / word for word in words if word.startswith("sweeps/")]
             assert all(path.is_file() for path in ready)
             if ready and hasattr(options, "settings") and command != "identify":
@@ -210,7 +210,7 @@ def test_the_toml_of_a_page_is_a_configuration(name):
 
 
 def run_command(command: str, words: list[str], folder: Path) -> None:
-    """Run one command of a page in a folder, sweeps with few lanes."""
+    """Run one command of a page in a folder; sweeps have few lanes."""
     if command in TOO_LONG:
         return
     own = [one for key, more in ALSO.items() if key in words for one in more]
@@ -226,12 +226,12 @@ def run_command(command: str, words: list[str], folder: Path) -> None:
 
 
 def own_pair() -> str:
-    """Return the configuration of the pair of one's own."""
+    """Return the configuration of the user's own pair in the README."""
     return next(text for language, text, _ in blocks("README.md") if language == "toml")
 
 
 def saved_under(line: str) -> str | None:
-    """Return the file under which a line before a block says to save it."""
+    """Return the file name under which the line before a block says to save the block."""
     found = re.search(r"[Ss]ave (?:this|it) as `([\w.]+)`", line)
     return found[1] if found else None
 

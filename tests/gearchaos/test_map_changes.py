@@ -1,4 +1,4 @@
-"""Changes of a map between neighbouring cells, from which boundaries are started."""
+"""Changes between neighbouring cells of a map are the starts of boundaries."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,9 @@ from gearchaos.outputs.variable import Variable
 
 
 def of_map(period, impacts=None, jump=0.0):
-    """Return the changes of a map, whose periods have the shape (second, first).
+    """Return the changes of a map with periods of the shape (second, first).
 
-    ``jump``: by how much the first state jumps between the fourth and the fifth column.
+    ``jump``: jump of the first state between the fourth and the fifth column.
     """
     period = np.asarray(period)
     second, first = np.meshgrid(np.arange(5.0), np.arange(6.0), indexing="ij")
@@ -35,7 +35,7 @@ def of_map(period, impacts=None, jump=0.0):
 
 
 def cells(changes):
-    """Return the pairs of cells of changes, that of the motion first."""
+    """Return the pair of cells of each change, with the cell of the motion first."""
     return {(*map(tuple, one.tolist()),) for one in changes.cells}
 
 

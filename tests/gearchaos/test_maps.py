@@ -1,4 +1,4 @@
-"""Maps over two parameters: every lane is a cell of its own value, and what has none is named."""
+"""Maps over two parameters: each lane is a cell, and the legend names cells without a value."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ EXPONENT = np.array([[-0.3, -0.1, -0.2, 0.01], [-0.1, -0.4, 0.0, 0.2], [np.nan, 
 
 
 def result_over(*axes: Variable, labelled: bool = True) -> Result:
-    """Three pitch errors by four speeds, unevenly spaced; two lanes diverged at the lowest."""
+    """Return three pitch errors by four uneven speeds; the last error diverged at two speeds."""
     variables = sweep_variables(
         axes,
         states=["delta_5"],
@@ -136,7 +136,7 @@ def test_exponents_are_white_at_zero_blue_below_and_orange_above():
     ("outlier", "ends"), [(-90.0, "min"), (90.0, "max"), (None, "neither")], ids=str
 )
 def test_the_bar_of_colours_ends_in_an_arrow_where_numbers_lie_beyond_it(outlier, ends):
-    """Of 60 numbers one far out is beyond robust limits, on the side on which it lies."""
+    """One outlier among 60 numbers is beyond the robust limits, on its own side."""
     numbers = np.linspace(0.0, 1.0, 60)
     if outlier is not None:
         numbers[7] = outlier
@@ -145,7 +145,7 @@ def test_the_bar_of_colours_ends_in_an_arrow_where_numbers_lie_beyond_it(outlier
     image = _number_cells(axes, edges, numbers.reshape(6, 10), signed=False)
     (bar,) = axes.child_axes
     assert image.colorbar.extend == ends
-    # Beyond the ends of the bar lies a triangle, and to the left is below.
+    # A triangle lies beyond an end of the bar; the left end is the lower one.
     patches = [one.get_path().get_extents() for one in bar.get_children() if type(one) is PathPatch]
     assert len(patches) == (outlier is not None)
     assert all((patch.x0 < 0.0) == (ends == "min") for patch in patches)
@@ -180,7 +180,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
     for axes in page.axes:
         assert [line.get_xdata() for line in axes.lines] == [[1200.0, 1200.0]] * 2
     assert legend_of(page.axes[0])[-1] == "speed = 1200 rpm"
-    # A legend or a title that lies on a map, or on another one's, hides something.
+    # A legend or a colour bar with its title must not cover a map.
     boxes = [axes.get_legend() or axes.child_axes[0] for axes in page.axes]
     renderer = page.canvas.get_renderer()
     for one in boxes:

@@ -1,4 +1,4 @@
-"""The merge command: it joins what is complete, and names what is not."""
+"""The merge command joins complete sweeps and names missing or damaged blocks."""
 
 import json
 
@@ -76,7 +76,7 @@ def test_an_existing_file_is_kept_unless_it_may_be_replaced(tmp_path):
     assert "gears.h5: exists already; replace it with --overwrite" in ended.err
     assert (tmp_path / "gears.h5").read_bytes() == b"precious"
     assert merge(tmp_path, "gears.h5", "--overwrite").code == 0
-    # Once more, as a job that is started again does.
+    # A job that is started again merges again.
     assert merge(tmp_path, "gears.h5", "--quiet") == (0, "gears.h5\n", "")
 
 

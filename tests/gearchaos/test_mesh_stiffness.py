@@ -1,4 +1,4 @@
-"""The mesh stiffness as a trapezoid, as a Fourier series, and each from the other."""
+"""The mesh stiffness as a trapezoid and as a Fourier series, and conversions between both."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ SHAPES = [
 
 
 def contact_line_length(phases, transverse, overlap):
-    """Sum over the teeth of the part of the contact line inside the field of contact."""
+    """Return the length of the contact lines inside the field of contact, summed over the teeth."""
     teeth = np.arange(-20, 21)[:, None]
     front = phases + teeth
     inside = np.minimum(front, transverse) - np.maximum(front - overlap, 0.0)

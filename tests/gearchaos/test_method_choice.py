@@ -1,4 +1,4 @@
-"""The method that is chosen with ``integration.method = "auto"``."""
+"""``integration.method = "auto"`` chooses a method."""
 
 import json
 
@@ -76,7 +76,7 @@ def test_the_result_is_that_of_the_chosen_method():
     auto = gearchaos.run(gearchaos.load_config(PAN2021, [*overrides, AUTO]))
     maps = gearchaos.load_config(PAN2021, overrides).integrated_by("flow_map")
     np.testing.assert_array_equal(auto["section_delta_5"], gearchaos.run(maps)["section_delta_5"])
-    # The text stays as given; the configuration that was computed has the chosen method.
+    # The configuration text stays as given; the resolved configuration has the chosen method.
     assert 'method = "auto"' not in auto.metadata["configuration_resolved"]
     assert auto.metadata["method"] == "flow_map"
     assert auto.metadata["method_description"] == (
@@ -90,7 +90,7 @@ def test_kernels_and_configurations_know_the_same_methods():
     for one in INTEGRATORS:
         compiled = METHODS[one.name]
         assert compiled.always_resolved == one.always_resolved
-        # A step without an error is stable whatever its length.
+        # A step without an error is stable at any length.
         assert (compiled.stable_reach is None) == one.exact
 
 

@@ -26,7 +26,7 @@ RANDOM = np.random.default_rng(11)
 
 
 def record(section: np.ndarray, growth: np.ndarray | None = None, torus: bool = True) -> Record:
-    """One lane; a neutral tangent vector where nothing is said of it."""
+    """Return the record of one lane; without a growth, its tangent vector is neutral."""
     growth = np.zeros(section.shape[0]) if growth is None else growth
     sections = section[np.newaxis].astype(float)
     broken = ~np.isfinite(sections).all(axis=(1, 2))
@@ -39,7 +39,7 @@ def labelled(*arguments, **options) -> tuple[int, int, float]:
 
 
 def logistic(r: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Section and growth of the logistic map after a transient."""
+    """Return section and growth of the logistic map after a transient."""
     x = 0.4
     for _ in range(3000):
         x = r * x * (1.0 - x)
@@ -51,7 +51,7 @@ def logistic(r: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
 
 
 def circle(rotation: float, points: int = POINTS) -> np.ndarray:
-    """Points of an ellipse with a dent, visited at equal angles."""
+    """Return points of a dented ellipse, visited at equal steps of the angle."""
     angle = 2.0 * np.pi * rotation * np.arange(points)
     radius = 1.0 + 0.2 * np.cos(3.0 * angle)
     return np.stack([3.0 + radius * np.cos(angle), 0.5 * radius * np.sin(angle)], axis=1)
@@ -180,7 +180,7 @@ def test_a_slow_approach_from_alternating_sides_returns_best_after_twice_the_per
     slowly = 0.05 * (-0.998) ** np.arange(POINTS)[:, np.newaxis]
     settling = record(orbit + slowly, np.full(POINTS, np.log(0.998)))
     assert settling_periods(settling, label(settling)).tolist() == [6]
-    # Closer to the orbit it returns after twice the period, and is still not of twice the period.
+    # Closer to the orbit, the motion returns after twice the period; its period is not doubled.
     close = record(orbit + 1e-2 * slowly, np.full(POINTS, np.log(0.998)))
     assert label(close).period.tolist() == [6]
     assert settling_periods(close, label(close)).tolist() == [3]
@@ -189,7 +189,7 @@ def test_a_slow_approach_from_alternating_sides_returns_best_after_twice_the_per
 
 
 def test_the_end_of_a_short_record_is_compared_with_its_begin():
-    # Of an excitation of many mesh periods a record holds few points.
+    # If an excitation has many mesh periods, a record holds few points.
     slowly = 1.0 + 1e-5 * (-0.6) ** np.arange(24)[:, np.newaxis]
     settling = record(slowly, np.full(24, np.log(0.6)))
     assert label(settling).period.tolist() == [2]
@@ -238,7 +238,7 @@ def test_without_an_exponent_a_longer_record_would_not_show_chaos():
 
 
 def test_few_points_do_not_show_that_a_motion_grows():
-    """Three points of bounded chaos, as teeth with errors give for each lane, lie far apart."""
+    """Three points of bounded chaos lie far apart; teeth with errors give few points per lane."""
     few = np.array([[0.33], [0.9], [1.36]])
     assert labelled(few, np.full(3, 0.8))[0] == CHAOTIC
     grown = np.exp(0.3 * np.arange(40.0))[:, np.newaxis]

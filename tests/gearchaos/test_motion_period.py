@@ -1,4 +1,4 @@
-"""The period of a motion is that of its section, whatever its phase and its scale."""
+"""The period of a motion is the period of its section, at any phase and scale."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ RANDOM = np.random.default_rng(7)
 
 
 def orbit(period: int, points: int = 60, states: int = 2) -> np.ndarray:
-    """Repeat so many random points: the section of one periodic lane."""
+    """Return the section of one periodic lane: ``period`` random points, repeated."""
     cycle = RANDOM.uniform(-1.0, 1.0, (period, states))
     return np.resize(cycle, (points, states))[np.newaxis]
 

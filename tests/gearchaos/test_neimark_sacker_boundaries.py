@@ -1,6 +1,6 @@
-"""Curves of Neimark-Sacker points over two parameters, against exact points and other orbits.
+"""Curves of Neimark-Sacker points over two parameters agree with exact points and other orbits.
 
-The exact points come from event-located matrix exponentials, with shooting and arclength.
+The exact points come from event-located matrix exponentials, shooting and arclength continuation.
 """
 
 import json
@@ -26,7 +26,7 @@ SWEEPS = Path(__file__).parents[2] / "sweeps"
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
 (LOST,) = EXACT["two_masses"]["neimark_sacker"]
 STOP = 100.0
-"""Stiffness of the stop of the exact points."""
+"""Stiffness of the stop at the exact points."""
 
 LIMITS = np.array([[0.6, 5.0], [0.635, STOP]])
 """Lowest and highest frequency and stiffness of the stop."""
@@ -36,14 +36,14 @@ QUICK += ["outputs.section_points=4", "integration.transient_periods=300"]
 
 
 def axis(table, parameter, low, high, count):
-    """Return the replacement of a swept parameter."""
+    """Return the override that sweeps a parameter."""
     keys = f"parameter='{parameter}', from={low}, to={high}, count={count}"
     return f"{table}={{{keys}}}"
 
 
 @cache
 def masses():
-    """Return the configuration of the two masses over their frequency and their stop."""
+    """Return the configuration of the two masses over frequency and stiffness of the stop."""
     config = gearchaos.load_config(
         SWEEPS / "two_masses.toml",
         [
@@ -67,7 +67,7 @@ def curve_of_masses():
 
 @cache
 def pair():
-    """Return the boundaries of the gear pair around two resonances 1:2, and its configuration."""
+    """Return the boundaries of the gear pair around two 1:2 resonances, and its configuration."""
     config = gearchaos.load_config(
         SWEEPS / "speed_and_error.toml",
         [
@@ -80,7 +80,7 @@ def pair():
 
 
 def orbit(config, values, state):
-    """Return the orbit at values of both parameters, found anew next to a state."""
+    """Return the orbit at values of both parameters, computed again from a state near it."""
     named = {
         sweep.parameter: float(value)
         for sweep, value in zip(config.sweeps.values(), values, strict=True)
@@ -90,7 +90,10 @@ def orbit(config, values, state):
 
 
 def on_circle(config, curve, chosen):
-    """Return the pairs of multipliers of orbits found anew at some points of a curve."""
+    """Return a multiplier of each orbit computed again at some points of a curve.
+
+    The product of this multiplier and another one is the closest to 1.
+    """
     pairs = []
     for values, section in zip(curve.values[chosen], curve.section[chosen], strict=True):
         multipliers = orbit(config, values, section[-1]).multipliers

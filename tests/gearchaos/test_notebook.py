@@ -1,4 +1,4 @@
-"""The tutorials are notebooks: they run, and print what they show."""
+"""The tutorials are notebooks; they run and print the output that they contain."""
 
 import json
 import os
@@ -16,11 +16,11 @@ ANY_TEXT = "nbval-ignore-output"
 
 
 def printed(notebook):
-    """Return what each cell has printed, and which kinds of pictures it shows."""
+    """Return the printed text of each cell and the kinds of its pictures."""
     shown = []
     for cell in notebook.cells:
         outputs = cell.get("outputs", [])
-        # A terminal ends lines with a carriage return, too.
+        # A terminal also ends lines with a carriage return.
         text = "".join(output.get("text", "").replace("\r", "") for output in outputs)
         kinds = [sorted(output["data"]) for output in outputs if "data" in output]
         shown.append((bool(text) if ANY_TEXT in cell.metadata.get("tags", ()) else text, kinds))
@@ -30,11 +30,11 @@ def printed(notebook):
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_and_prints_what_it_shows(path, tmp_path, monkeypatch):
-    # Not imported by the processes that only collect this test.
+    # Imported here: processes that only collect this test do not need these packages.
     import nbformat
     from nbclient import NotebookClient
 
-    # Its commands are those of this environment.
+    # The notebook runs the commands of this environment.
     scripts = str(Path(sys.executable).parent)
     monkeypatch.setenv("PATH", os.pathsep.join((scripts, os.environ["PATH"])))
     notebook = nbformat.read(path, as_version=4)

@@ -1,4 +1,4 @@
-"""Observations are read off sections whose motions are known."""
+"""Observations are computed from sections of known motions."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ POINTS = np.arange(96)
 
 
 def records(*sections, exponent=-0.1):
-    """One candidate whose lanes have these sections."""
+    """Return the records of one candidate whose lanes have these sections."""
     section = np.stack(np.broadcast_arrays(*sections, POINTS * 0.0)[:-1])[np.newaxis]
     returns = return_distances(section[0][..., np.newaxis]) <= RETURN
     period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
@@ -67,12 +67,12 @@ def test_the_length_of_a_wrong_motion_counts():
     stage = stage_length(ObservedStage(motion="period 2", **{"from": 1.0, "to": 2.0}, width=0.1))
     lanes = [CYCLES[1] if value < 1.3 else CYCLES[2] for value in stage.values]
     (length,) = stage.computed(records(*lanes))
-    # A cell counts as a whole: the one that 1.3 lies in may be counted or not.
+    # A cell counts as a whole: the cell that contains 1.3 may be counted or not.
     cell = np.max(np.diff(stage.values))
     assert length == pytest.approx(0.3, abs=cell)
     assert stage.computed(records(*[CYCLES[2]] * stage.values.size)) == [0.0]
     assert stage.computed(records(*[CYCLES[1]] * stage.values.size)) == pytest.approx([1.0])
-    # A boundary that is off by a width is seen.
+    # A boundary that is wrong by one width is detected.
     assert stage.values[0] - 1.0 < 0.1 and 2.0 - stage.values[-1] < 0.1
 
 
@@ -90,14 +90,14 @@ def test_a_branch_without_a_jump_has_none():
     jump = change_place("jump", ObservedPlace(at=1.0, within=(0.5, 1.5), width=0.02))
     computed = jump.computed(records(*[0.3 * value + 1.0 for value in jump.values]))
     assert np.isnan(computed).all()
-    # What is not there at all is as wrong as the span is long.
+    # The error of a missing jump is the length of the span.
     assert jump.residual(computed) == pytest.approx([1.0 / 0.02])
 
 
 def test_a_crisis_lies_where_the_section_first_grows():
     crisis = change_place("crisis", ObservedPlace(at=1.0, within=(0.5, 1.5), width=0.02))
     seeds = range(crisis.values.size)
-    # After it, every third lane has not left the former part of the section.
+    # Above the crisis, only every third lane has left the former part of the section.
     wide = [value > 1.1 and seed % 3 == 0 for seed, value in zip(seeds, crisis.values, strict=True)]
     lanes = [chaos(2.0 if one else 1.0, seed) for seed, one in zip(seeds, wide, strict=True)]
     (found,) = crisis.computed(records(*lanes))

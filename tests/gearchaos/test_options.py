@@ -1,4 +1,4 @@
-"""Options are read off the command line as their types say, for every command."""
+"""Every command reads its options from the command line according to their types."""
 
 from functools import partial
 from importlib import import_module
@@ -133,7 +133,7 @@ def test_the_help_of_an_option_has_at_most_three_lines(name):
     assert main.name == name
     for _, option in (get_args(hint) for hint in hints_of(main.options).values()):
         if isinstance(option, Option):
-            # On a terminal of 80 columns argparse leaves 54 for the text.
+            # On a terminal of 80 columns argparse leaves 54 columns for the text.
             assert 1 <= len(wrap(option.help, 54)) <= 3, option
 
 

@@ -1,4 +1,4 @@
-"""Periodic orbits: linear and exact truths, stored orbits, and what is not taken for an orbit."""
+"""Periodic orbits: linear and exact solutions, stored orbits, and motions that are no orbits."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def found_orbits(scene, multiples, guess, period, steps=200) -> Orbits:
 
 
 def polished(name: str, steps: int) -> Orbits:
-    """The stored orbits, looked for from points beside them."""
+    """Return the stored orbits, found from points next to them."""
     orbits = STORED[name]
     points = first_points(orbits)
     beside = points * (1.0 + 1e-4 * np.sin(np.arange(points.shape[1])))
@@ -51,7 +51,7 @@ def polished(name: str, steps: int) -> Orbits:
 
 
 def settled(scene, multiples, transient=500) -> tuple[np.ndarray, np.ndarray]:
-    """End states and periods from rest."""
+    """Return end states and periods of motions that start at rest."""
     system = system_of(pan2021(multiples), scene)
     plan = Plan(200, transient, 48, 48, tangent=True)
     outcome = integrate(system, np.zeros((system.lanes, len(system.states))), plan)
@@ -130,7 +130,7 @@ def test_an_orbit_of_a_divisor_of_the_period_is_not_taken_for_one_of_the_period(
 
 
 def test_a_slow_transient_that_alternates_is_no_orbit_of_period_two():
-    # Close below the period doubling the motion still alternates after 600 periods.
+    # Just below the period doubling the motion still alternates after 600 periods.
     guess, period = settled(NO_AXIAL, 10.257, 600)
     assert period[0] == 2
     assert_nothing_found(found_orbits(NO_AXIAL, 10.257, guess, [2]))

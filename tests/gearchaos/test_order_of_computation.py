@@ -1,4 +1,4 @@
-"""The order in which lanes are computed: those that share flow maps are neighbours."""
+"""Lanes that share flow maps are computed next to each other."""
 
 import numpy as np
 import pytest

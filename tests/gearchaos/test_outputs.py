@@ -1,4 +1,4 @@
-"""The catalogue of outputs is complete: what has no entry is refused, not left out."""
+"""The catalogue of outputs is complete: arrays without an entry are refused, not left out."""
 
 import doctest
 import re
@@ -42,7 +42,7 @@ OSCILLATOR = Catalogue(
         BaseScale("gap", "g"), BaseScale("frequency", r"\omega"), BaseScale("spring", "k"), "help"
     ),
 )
-"""A mass against a stop, the outputs of which are described in this file alone."""
+"""A mass against a stop; only this file describes its outputs."""
 
 
 def oscillator_result() -> Result:
@@ -86,7 +86,7 @@ def names_of(part, *subjects, **details):
     ("details", "unknown"),
     [
         (Details(values={"section_points": np.arange(3)}), "section_points"),
-        # The name of one variable is not that of the entry of all.
+        # This is the name of one variable; the entry of all sections has another name.
         (Details(values={"section_delta_5": [1.0]}), "section_delta_5"),
         (Details(meanings={"statuses": ["ok"], "motions": ["chaotic"]}), "motions, statuses"),
         (Details(wordings={"periods": "mesh periods"}), "periods"),
@@ -142,12 +142,12 @@ def test_a_long_name_without_its_wording_is_refused():
             {"parts": (*catalogue.PARTS, catalogue.ORDERS_PART)},
             "^order: is the name of two outputs",
         ),
-        # The motion of a state has its name in a response.
+        # In a response, the motion of a state has the name of the state.
         (
             {"subjects": {Kind.STATE: (Subject("time", "time"),)}},
             "^time: is the name of two outputs",
         ),
-        ({"long_names": {"statuses": "what became of it"}}, "^statuses: has no entry"),
+        ({"long_names": {"statuses": "status of the lane"}}, "^statuses: has no entry"),
         (
             {"parts": (Part("always", (Output("a", "a", errors=("b",)),)),)},
             "^b: has no entry",
@@ -269,7 +269,7 @@ def test_a_file_of_an_unknown_model_is_read_with_the_units_that_it_names(tmp_pat
     oscillator_result().save(tmp_path / "raw.h5")
     raw = open_result(tmp_path / "raw.h5")
     assert set(raw) == set(oscillator_result())
-    # The entries of exponents are known, those of the states of the oscillator are not.
+    # Exponents have known entries, states of the oscillator have none.
     assert raw.variables["section_x"].scale == PURE
     with pytest.raises(
         ConfigurationError, match=r"^lyapunov_exponent: .*does not give the scaling"

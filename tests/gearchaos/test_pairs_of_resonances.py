@@ -1,4 +1,4 @@
-"""Two points of codimension 2 between the same two points of a boundary."""
+"""Two points of codimension 2 between the same two points of a boundary are both found."""
 
 from functools import cache
 from pathlib import Path
@@ -24,12 +24,12 @@ MAP = Path(__file__).parents[2] / "sweeps" / "speed_and_error.toml"
 NAMES = "mesh_frequency", "pitch_error"
 LIMITS = np.array([[0.8, 1.0], [0.85, 3.0]])
 RESONANCES = np.array([[0.83951769, 2.44584793], [0.83129762, 2.63652586]])
-"""Where two multipliers of the fold are 1, from a search with shorter steps."""
+"""Points where two multipliers of the fold are 1, from a search with shorter steps."""
 
 
 @cache
 def fold():
-    """Return the equations of a fold, and the path along it."""
+    """Return the equations of a fold and the path along the fold."""
     sweeps = [
         f"{table}={{parameter='{name}', from={low}, to={high}, count=9}}"
         for table, name, (low, high) in zip(("sweep", "second_sweep"), NAMES, LIMITS.T, strict=True)
@@ -62,7 +62,7 @@ def fold():
 
 
 def located(path):
-    """Return the kinds of points of codimension 2 along a path, and both parameters of each."""
+    """Return kinds and parameters of the points of codimension 2 along a path."""
     equations, _ = fold()
     with one_thread():
         found = run(completed(equations, path), passed_of).located

@@ -1,4 +1,4 @@
-"""Results in physical units: their factors, their labels, and what cannot be converted."""
+"""Results in physical units: factors, labels, and values that cannot be converted."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_what_a_mistaken_unit_makes_of_a_pair_is_reported(tmp_path):
     assert "unlikely" not in notes()
     told = notes("pair.face_width_mm=0.02", "pitch_error.amplitude_um=8000.0", "sweep.to=1.0")
     assert "pitch error 8000 um, face width 0.02 mm: unlikely at a normal module of" in told
-    # From a tenth of the module on, 216.6 um.
+    # The warning begins at a tenth of the module, 216.6 um.
     assert "pitch error 225 um" in notes("pitch_error.amplitude_um=45.0")
     assert "unlikely" not in notes("pitch_error.amplitude_um=43.0")
     assert "static deflection" in notes("mesh.mean_stiffness_N_per_um_mm=0.01")
@@ -79,7 +79,7 @@ def test_lengths_times_and_forces_are_those_of_the_pair(result):
         result.parameters[name].values
         for name in ("length_scale", "scaling_frequency", "mean_mesh_stiffness")
     )
-    # small_config: 25 um, 13 N/(um mm) over the face width.
+    # small_config has 25 um, and 13 N/(um mm) over the face width.
     assert length == 25.0
     found = result.physical()
     for name, factor, units in (
@@ -94,7 +94,7 @@ def test_lengths_times_and_forces_are_those_of_the_pair(result):
     ):
         assert found[name] == pytest.approx(factor * result[name], nan_ok=True), name
         assert found.attributes(name)["units"] == units
-    # 50 Nm at the base radius of the driving gear, 22.5688 mm.
+    # The load is 50 Nm at the base radius of the driving gear, 22.5688 mm.
     force = 1e-6 * length * stiffness * result.parameters["load"].values
     assert force == pytest.approx(50.0 / 22.5688e-3, rel=1e-5)
     assert result.parameters["static_load"].values == pytest.approx(force)
@@ -124,7 +124,7 @@ def test_accelerations_are_the_rates_of_the_speeds(path):
     acceleration, speed = (found[name][0] for name in ("delta_5_acceleration", "delta_5_rate"))
     assert found.attributes("delta_5_acceleration")["units"] == "m/s^2"
     step = motion.parameters["mesh_period"].values / (speed.size - 1)
-    # By the trapezoidal rule, whose error is of second order in the forty steps.
+    # The error of the trapezoidal rule is of second order in the forty steps.
     gained = np.cumsum(acceleration[1:] + acceleration[:-1]) * step / 2.0
     assert gained == pytest.approx(speed[1:] - speed[0], abs=0.02 * np.ptp(speed))
 

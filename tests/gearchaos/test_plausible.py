@@ -14,7 +14,7 @@ SWEEPS = Path(__file__).resolve().parents[2] / "sweeps"
 
 
 def warned(folder: Path, *overrides: str) -> list[str]:
-    """Return the notes, or the problems, of the small sweep with some values."""
+    """Return the notes or the problems of the small sweep with some values."""
     given = ("integration.unstable=raise", *overrides)
     try:
         notes = plan_run(gearchaos.load_config(small_config(folder), given)).notes

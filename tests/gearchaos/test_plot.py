@@ -1,4 +1,4 @@
-"""The plot command on real files: what it writes, what it says, and how it ends."""
+"""The plot command on real files: its pictures, messages and exit codes."""
 
 import os
 import re
@@ -22,7 +22,7 @@ PICTURES = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "eps": b"%!PS", 
 
 @pytest.fixture
 def result_file(tmp_path) -> Path:
-    """Write a result of 50 lanes, of which one diverged."""
+    """Write a result of 50 lanes; one lane diverged."""
     load = np.linspace(0.0, 1.0, 50)
     points = np.sqrt(load)[:, np.newaxis] * [-1.0, 1.0]
     status = np.zeros(50)
@@ -93,7 +93,7 @@ def test_every_format_says_whose_it_is_and_gives_the_same_bits(result_file, endi
     assert drawn[0] == drawn[1] and drawn[0].startswith(begins)
     assert b"gearchaos " in drawn[0] and b"Date" not in drawn[0]
     if ending == "eps":
-        # It has no transparency: a picture of translucent dots alone would be a black box.
+        # EPS has no transparency: a picture with only translucent dots would be a black box.
         pictures = re.findall(rb"false 3 colorimage\n([0-9a-f\n]+)", drawn[0])
         assert len(pictures) == 2
         for picture in pictures:
@@ -150,7 +150,7 @@ def test_several_sweeps_are_drawn_over_each_other(result_file, capsys):
 
 
 def test_an_odd_name_comes_out_as_it_went_in(result_file):
-    # Signs of formulas and formats, letters beyond ASCII, and what is no Unicode.
+    # The name has characters of formulas and formats, non-ASCII letters, and invalid UTF-8.
     path = os.fsencode(result_file.parent) + b"/pair $ 50 % gr\xc3\xb6\xc3\x9fe \xff.h5"
     with h5py.File(result_file, "r+") as file:
         file.attrs["title"] = ""

@@ -1,4 +1,4 @@
-"""How every command ends: faults become lines on stderr and exit codes, never tracebacks."""
+"""Every command turns faults into lines on stderr and exit codes, never into tracebacks."""
 
 import os
 import subprocess

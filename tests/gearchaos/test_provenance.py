@@ -1,4 +1,4 @@
-"""What a result says about where it comes from."""
+"""A result contains its provenance."""
 
 import platform
 import re
@@ -29,7 +29,7 @@ def test_the_configuration_is_there_as_it_was_written_and_with_everything_filled
     assert result.metadata["configuration"] == SMALL
     resolved = result.metadata["configuration_resolved"]
     again = gearchaos.Configuration.from_toml(resolved, "resolved.toml")
-    assert again.sweep.count == 3  # The override is in it.
+    assert again.sweep.count == 3  # The override is included.
     assert again.resolved_toml() == resolved
     assert 'formulation = "physical"' in resolved
 
@@ -56,7 +56,7 @@ def test_every_group_says_whether_it_was_given_or_derived(result, group, origin)
 
 
 def test_values_of_the_groups_are_those_that_were_integrated(result):
-    assert result.parameters["damping_ratio"].values == 0.05  # The 0.1 of [mesh] gave way.
+    assert result.parameters["damping_ratio"].values == 0.05  # Not the 0.1 of [mesh].
     assert result.parameters["half_backlash"].values == pytest.approx(0.8)
     assert result.parameters["pitch_error"].values == pytest.approx([0.0, 2.5, 5.0])
 
@@ -108,6 +108,6 @@ def test_the_commit_is_named_with_its_changes_where_there_is_one_and_left_out_el
 
 
 def test_the_result_names_the_commit_of_the_clone_that_made_it(result):
-    # Somebody may have changed a file since.
+    # A file may have changed since the result was computed.
     commit = commit_of(Path(gearchaos.__file__).parents[1]).removesuffix("-dirty")
     assert result.metadata.get("git_commit", "").removesuffix("-dirty") == commit

@@ -1,4 +1,4 @@
-"""Losses of stability that ``stages --refine`` names: exact folds, steep ones, confirmed ones."""
+"""``stages --refine`` names losses of stability: exact folds, steep folds, confirmed losses."""
 
 import json
 
@@ -14,10 +14,10 @@ from .test_spur_pair import SPUR_PAIR
 FIGURE_7 = PAN2021.with_name("pan2021.toml")
 
 EXACT_FOLDS = {0.02: (0.887204856, 0.926878895), 0.1: (0.585331570, 0.731361127)}
-"""Mesh frequencies of the folds of x'' + 0.1 x' + D(x; 1) = 0.1 + F_ah W^2 cos(W tau).
+"""Mesh frequencies of the folds of x'' + 0.1 x' + D(x; 1) = 0.1 + F_ah W^2 cos(W tau), by F_ah.
 
-For two F_ah: computed with event-located matrix exponentials, shooting and arclength, and closed a
-second time with an adaptive integrator.
+They were computed with event-located matrix exponentials, shooting and arclength continuation. An
+adaptive integrator confirmed that the orbits close.
 """
 
 SPUR_PAIR_25_41 = """\
@@ -56,7 +56,7 @@ recorded_periods = 504
 
 
 def refined(folder, source, overrides, width: str) -> list[dict]:
-    """The boundaries that the command prints of a sweep that is computed first."""
+    """Compute a sweep and return the boundaries that the command prints for it."""
     config = gearchaos.load_config(source, overrides)
     gearchaos.run(config).save(folder / "result.h5")
     ended = run_module("gearchaos.stages", "result.h5", "--refine", width, "--json", cwd=folder)
@@ -69,7 +69,7 @@ def test_refined_folds_are_the_exact_ones(tmp_path, forcing):
     low, high = EXACT_FOLDS[forcing]
     changes = (
         "groups.stiffness_variation_scale=0.0",
-        # At constant stiffness the phase of the error is a matter of when the time begins.
+        # At constant stiffness the phase of the error only sets the origin of the time.
         "groups.pitch_error_phase_deg=0.0",
         f"groups.pitch_error_amplitude={forcing}",
         f"sweep={{parameter='mesh_frequency', from={low - 0.02}, to={high + 0.02}, count=13}}",
@@ -98,7 +98,7 @@ STEEP = (
 
 
 def test_a_steep_fold_is_followed_until_its_multiplier_is_one(tmp_path):
-    """Its multipliers are 0.644 +- 0.218i at a distance of 1e-5, and 0.964 at 1e-7."""
+    """Its multipliers are 0.644 +- 0.218i at a distance of 1e-5 from the fold, 0.964 at 1e-7."""
     downwards, *_ = refined(tmp_path, FIGURE_7, STEEP, "0.001")
     assert downwards["direction"] == "downwards"
     assert downwards["loss"].startswith("fold")
@@ -119,7 +119,7 @@ def test_a_steep_fold_is_located_whatever_the_width(width):
 
 
 def test_an_unstable_orbit_of_another_branch_is_no_loss_of_stability(tmp_path):
-    """Newton's method finds one, of the multiplier 2.69, at the first step downwards."""
+    """Newton's method finds an orbit with the multiplier 2.69 at the first step downwards."""
     (tmp_path / "pair.toml").write_text(SPUR_PAIR_25_41, encoding="utf-8")
     *_, boundary = refined(tmp_path, tmp_path / "pair.toml", (), "5")
     assert boundary["label_above"] == "period 14"

@@ -1,4 +1,4 @@
-"""What a release says of itself is the same in every place."""
+"""Version, paper and supported systems of a release are the same in every file."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The report of a result: complete, self-contained, and with the numbers of the other commands."""
+"""The report of a result is complete, self-contained, and has the numbers of the other commands."""
 
 import csv
 import json
@@ -38,7 +38,7 @@ KINDS = {
 
 
 class Reader(HTMLParser):
-    """What a page holds: attributes of all tags, rows of tables, captions, headings, texts."""
+    """Parse a page: attributes of all tags, rows of tables, captions, headings and other texts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ class Reader(HTMLParser):
 
     @property
     def pictures(self) -> list[ElementTree.Element]:
-        """All pictures, parsed."""
+        """All pictures as parsed XML."""
         sources = [one["src"] for tag, one in self.tags if tag == "img"]
         begin = "data:image/svg+xml;base64,"
         assert all(one.startswith(begin) for one in sources)
@@ -104,7 +104,7 @@ def shown(text: str) -> str:
 @pytest.mark.parametrize("kind", [*KINDS, "response", "shares"])
 def test_a_page_loads_nothing_and_has_figures_configuration_and_versions(kind, folder, capsys):
     page = report(folder / f"{kind}.h5", capsys)
-    # The carried sweep also has one for the load factor, and one for each force.
+    # The carried sweep also has a picture of the load factor and one of each force.
     assert len(page.pictures) == {"response": 2, "shares": 2, "carried": 4}.get(kind, 1)
     for tag, given in page.tags:
         assert tag not in ("script", "link", "iframe", "object", "base"), tag

@@ -1,4 +1,4 @@
-"""The gallery: rules of verdicts, printed numbers kept once, and a report that stands alone."""
+"""The gallery: rules of verdicts, a single copy of the printed numbers, a self-contained report."""
 
 import math
 import re
@@ -41,7 +41,7 @@ CLONE = Path(__file__).resolve().parents[2]
 
 
 def tables(text: str) -> dict[str, list[list[str]]]:
-    """The cells of every Markdown table under each heading, without the heads of the tables."""
+    """Return the cells of every Markdown table by heading, without the heads of the tables."""
     found: dict[str, list[list[str]]] = {}
     heading, head = "", True
     for line in text.splitlines():
@@ -58,7 +58,7 @@ def tables(text: str) -> dict[str, list[list[str]]]:
 
 
 def numbers(text: str | list[str]) -> list[float]:
-    """All numbers of a cell or of several, each as a whole."""
+    """Return all complete numbers of one or several cells."""
     joined = text if isinstance(text, str) else " | ".join(text)
     plain = joined.replace("−", "-")
     return [
@@ -129,7 +129,7 @@ def test_the_configuration_and_the_printed_numbers_say_the_same():
         assert groups["mesh_frequency"] == pytest.approx(2.0 * np.pi * numbers["frequency"])
         ends = config.sweep.from_, config.sweep.to
         assert ends == (printed.stages[0].first, printed.stages[-1].last)
-    # Only the first set took the printed damping for that of the whole face width.
+    # Only the first set takes the printed damping as that of the whole face width.
     assert groups["damping_ratio"] == pytest.approx(numbers["damping_ratio"] / np.sqrt(15.0))
 
 
@@ -161,7 +161,7 @@ def test_the_documentation_and_the_printed_numbers_say_the_same():
     assert numbers(increments) == [*printed.increments.values]
     stages = [row[1] for row in tables(text)["9. What agrees and what does not"]]
     spans = [[stage.first, stage.last] for stage in printed.stages]
-    # The last stage ends where the sweep does.
+    # The last stage ends at the end of the sweep.
     spans[-1].pop()
     assert [numbers(cell) for cell in stages[: len(spans)]] == spans
 
@@ -180,7 +180,7 @@ def test_table_2_holds_the_harmonics_of_the_contact_lines():
 
 
 def test_the_fit_of_figure_4_leaves_the_trapezoid_by_its_missing_harmonics_alone():
-    """Odd harmonics of a trapezoid in quarters have the amplitude 8 sqrt(2) h / (pi n)^2."""
+    """Odd harmonics of a trapezoid of equal parts have the amplitude 8 sqrt(2) h / (pi n)^2."""
     trapezoid, printed = contact_line_stiffness(), printed_coefficients()
     apart = np.max(np.abs(trapezoid.table(1000) - series_table(printed, 1000)))
     harmonics = np.abs(trapezoid.coefficients(6)[::2])
@@ -193,9 +193,9 @@ def test_the_fit_of_figure_4_leaves_the_trapezoid_by_its_missing_harmonics_alone
 
 @pytest.fixture(scope="module")
 def found():
-    """A gallery of few lanes and periods: all that depends on neither."""
+    """Return a gallery of few lanes and periods, for facts that do not depend on their numbers."""
     coarse = ["sweep.count=76", *COARSE]
-    # Of the soft axial bearings the transient is a long one.
+    # The soft axial bearings cause a long transient, which is kept.
     full = load_config(SWEEPS / "pan2021_full.toml", ["sweep.count=1", *COARSE[1:]])
     return compute_gallery(
         load_config(SWEEPS / "pan2021.toml", coarse), full, hop_step=0.1, periods=8
@@ -210,7 +210,7 @@ def folder(found, tmp_path_factory):
 
 
 def test_bands_that_take_turns_are_distinguished_from_what_does_not():
-    """The logistic map has two bands up to 3.6786; at 4 the sides are those of a fair coin."""
+    """The logistic map has two bands up to 3.6786; at 4 the sides are as random as a fair coin."""
     rates = np.array([3.2, 3.5, 3.6, 3.67, 3.84, 4.0])
     section = [np.full(rates.size, 0.3)]
     while len(section) < 4000:
@@ -218,7 +218,7 @@ def test_bands_that_take_turns_are_distinguished_from_what_does_not():
     shares = out_of_turn(np.array(section[2000:]).T)
     assert shares[:4].tolist() == [0.0] * 4
     assert shares[4] == pytest.approx(1.0 / 3.0, abs=1e-3)
-    # Four standard deviations of 1999 throws.
+    # The tolerance is four standard deviations of 1999 throws.
     assert shares[5] == pytest.approx(0.5, abs=2.0 / np.sqrt(1999))
 
 
@@ -287,7 +287,7 @@ def test_both_motions_exist_between_the_folds_and_only_one_parts_the_teeth(found
 
 @pytest.mark.slow
 def test_the_exponent_before_the_hop_is_that_of_the_sweep(found):
-    """The teeth stay in contact: one linear system with periodic coefficients, whatever P."""
+    """The teeth stay in contact: one linear system with periodic coefficients, at any P."""
     values = found.sweep[found.sweep.axis]
     before = found.sweep["lyapunov_exponent"][values < found.hop.changes["rest"][0]]
     assert before.size > 3
@@ -315,13 +315,13 @@ def test_the_report_shows_every_figure_and_leaves_nothing_open(report, folder):
 
 
 def close(cell: str, value: float, digits: int = 6) -> bool:
-    """Whether a cell that was rounded to so many digits holds a value."""
+    """Return whether a cell, rounded to ``digits`` digits, shows a value."""
     (number,) = numbers(cell)
     return number == pytest.approx(value, rel=0.51 * 10.0 ** (1 - digits), abs=1e-12)
 
 
 def contact_line_harmonics() -> np.ndarray:
-    """The first six a_n and c_n of the contact lines, relative to the mean, off their table."""
+    """Return the first six a_n and c_n of the contact lines, relative to the mean, from a table."""
     table = contact_line_stiffness().table(2**16)
     spectrum = 2.0 * np.fft.rfft(table)[1:7] / table.size
     return np.concatenate([spectrum.real, -spectrum.imag])
@@ -333,7 +333,7 @@ def table_2() -> list[float]:
 
 @pytest.mark.slow
 def test_every_derived_number_in_the_report_is_the_computed_one(report, found):
-    """The rows are known by what they name; none is left over on either side."""
+    """Rows are identified by their names; every row and every number has a counterpart."""
     pair, response = found.pair, found.response
     force = 13.3548e9 * 0.015
     ours = {
@@ -378,7 +378,7 @@ def test_what_the_report_says_of_the_slips_follows_from_what_is_printed(report, 
 
 @pytest.mark.slow
 def test_every_harmonic_in_the_report_is_that_of_the_contact_lines(report):
-    """The trapezoid in quarters: a_n and c_n follow from its corners alone."""
+    """The trapezoid has four equal parts: its corners alone determine a_n and c_n."""
     rows = tables(report)["Table 2: harmonics of the mesh stiffness"]
     names = [f"{letter}<sub>{n}</sub>" for letter in "ac" for n in range(1, 7)]
     assert [row[0] for row in rows] == names
@@ -403,7 +403,7 @@ def test_every_acceleration_in_the_report_is_the_largest_of_its_array(report, fo
     table_3 = dict(zip(order, (0.0113, 0.0009, 0.0007, 0.0022, 0.0019), strict=True))
     printed = [*table_3.values(), *published().increments.values, 0.1394]
     assert [numbers(row[3])[0] for row in rows] == printed
-    # The highest line of a motion that is forced with the mesh frequency is at that frequency.
+    # A motion that is forced at the mesh frequency has its highest line at this frequency.
     assert close(rows[-1][4], 1.0 / response["mesh_period"][0], 4)
 
     rows = tables(report)["Table 3"]
@@ -434,7 +434,7 @@ def test_the_hop_in_the_report_is_where_the_carried_sweeps_part(report, found):
 
 
 def labels_of(result, crisis, *, shared: bool = False) -> list[str]:
-    """The label of every lane, from the arrays: two bands if points take turns about the median."""
+    """Return the label of every lane; motions that alternate about the median have two bands."""
     widest = (crisis.before + crisis.after) / 2.0
     meanings = result.variables["motion"].flags
     labels = []
@@ -468,7 +468,7 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
         first, last = numbers(span) if span != "–" else (math.nan, math.nan)
         firsts.append(first)
         if span == "–":
-            # Nowhere within reach is there a lane with the motion.
+            # No lane within reach has the motion.
             reach = AGREEMENT_RULES["boundary"].in_kind
             lanes = zip(values, labels, strict=True)
             assert stage.motion not in [
@@ -476,7 +476,7 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
             ]
             assert row[5:] == ["–", "**does not agree**"]
         else:
-            # The lanes at its ends may lie in windows; all but windows have its motion.
+            # Lanes at the ends may lie in windows; all lanes outside windows have the motion.
             inside = labels[values.index(first) : values.index(last) + 1]
             own = inside.count(stage.motion) / len(inside)
             assert own > 0.5
@@ -526,7 +526,7 @@ def test_the_report_counts_apart_what_was_derived_fitted_and_predicted(report):
     for row, kind in zip(tables(report)["In short"], KINDS, strict=True):
         own = [r[6].strip("*") for r in compared if r[2] == kind]
         assert [int(cell) for cell in row[1:]] == [len(own), *(own.count(v) for v in Agreement)]
-    # Twelve harmonics, six of them zero but for rounding, take no motion to compute.
+    # Twelve harmonics follow without any motion; six of them are zero up to rounding.
     (derived, *_), harmonics = (
         tables(report)["In short"],
         tables(report)["Table 2: harmonics of the mesh stiffness"],

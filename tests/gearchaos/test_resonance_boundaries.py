@@ -1,4 +1,4 @@
-"""Folds between motions of one period: the labels of a map do not show where they are."""
+"""Folds between motions of equal period are found; the labels of a map do not show them."""
 
 from functools import cache
 from pathlib import Path
@@ -64,7 +64,7 @@ def resonances():
 
 
 def met(found, kind):
-    """Return the frequencies at which curves of a kind pass the load, in order."""
+    """Return the sorted frequencies at which curves of a kind cross the load."""
     places = []
     for one in found.boundaries:
         load, frequency = one.values[:, 1] - LOAD, one.values[:, 0]
@@ -91,7 +91,7 @@ def test_every_special_point_of_a_branch_lies_on_a_curve():
 
 
 def test_every_special_point_is_on_a_curve_where_the_map_of_rk4_jumps():
-    # At a grazing, steps of Newton's method stop shrinking at 1e-9.
+    # At a grazing, the steps of Newton's method stop shrinking at 1e-9.
     result = gearchaos.run(gearchaos.Configuration.from_toml(PUMP + SPEED_AND_ERROR, "pump.toml"))
     found = find_boundaries(result, lines=2)
     assert len(found.boundaries) >= 12

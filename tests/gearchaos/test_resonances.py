@@ -1,4 +1,4 @@
-"""Eigenfrequencies, where mesh orders meet them, and the static deflection, before a run."""
+"""Eigenfrequencies, their resonances with mesh orders, and the static deflection, before a run."""
 
 import json
 
@@ -42,8 +42,8 @@ def natural_hertz(pair, transverse, axial, per_width) -> np.ndarray:
     stiffness = stiffness + np.sin(tilt) * mesh * np.outer(react, axial_gap)
     m_p, m_g, i_p, i_g = pair["inertias"]
     squares = np.linalg.eigvals(stiffness / np.array([m_p, m_g, i_p, i_g, m_p, m_g])[:, None])
-    # The gears turn freely together.
-    # Rounding may leave a zero below 0.
+    # The lowest eigenvalue is left out: the gears can turn freely together.
+    # Rounding may make a zero negative.
     return np.sort(np.sqrt(np.maximum(np.sort(squares.real)[1:], 0.0))) / (2.0 * np.pi)
 
 
@@ -80,7 +80,7 @@ def test_a_pair_on_bearings_has_the_natural_frequencies_of_its_masses_and_spring
     axial = (3e7, 4e7) if "axial" in scene else (0.0, 0.0)
     wanted = natural_hertz(pair, (1e8, 2e8), axial, 13.3548e9)
     if "axial" not in scene:
-        # Without axial bearings both gears slide: the mesh holds them to each other alone.
+        # Without axial bearings both gears slide: only the mesh holds them to each other.
         tilt = np.arctan(np.tan(helix) * np.cos(pressure))
         held = np.sin(tilt) * 13.3548e9 * 15e-3 * np.sum(1.0 / masses)
         sliding = [0.0, np.sqrt(held) / (2.0 * np.pi)]
@@ -105,12 +105,13 @@ def test_a_slow_sweep_of_a_linear_pair_peaks_where_the_first_order_meets_its_mod
     response = gearchaos.respond(config, periods=1)
     amplitudes = np.stack([np.ptp(response[f"delta_{n}"], axis=-1) for n in (5, 1, 2)])
     values = response["mesh_frequency"]
-    # Largest of all within half a unit to either side: 24 samples a period miss a crest by 1 %.
+    # A peak is the largest value within half a unit on both sides: 24 samples per period miss a
+    # crest by 1 %.
     around = sliding_window_view(amplitudes, 21, axis=1).max(axis=2)
     peaks = [values[10:-10][row] for row in amplitudes[:, 10:-10] == around]
     assert len(modes) == 3
-    # Every mode has its peak in some coordinate, and no peak is farther from a mode than the width
-    # of the strongest damped one, 2 eta_11, for the other modes shift it.
+    # Every mode has a peak in some coordinate. A peak is not farther from a mode than the width
+    # 2 eta_11 of the most strongly damped mode, because the other modes shift it.
     for mode in modes:
         assert min(np.min(np.abs(row - mode)) for row in peaks if row.size) <= spacing
     for peak in np.concatenate(peaks):
@@ -119,7 +120,7 @@ def test_a_slow_sweep_of_a_linear_pair_peaks_where_the_first_order_meets_its_mod
 
 def test_the_static_deflection_is_where_a_loaded_pair_comes_to_rest():
     overrides = (
-        # Nothing but a load: every effect at the end of its range where it is none.
+        # The load acts alone: every effect has the value at which it vanishes.
         "groups.pitch_error=0.0",
         "groups.stiffness_variation_scale=0.0",
         "groups.half_backlash=0.0",
@@ -141,7 +142,7 @@ def test_a_static_deflection_in_micrometres_is_load_over_stiffness_along_the_lin
     tmp_path,
 ):
     found = known(small_config(tmp_path))
-    # 50 Nm at the base radius 22.5688 mm; the tangential force is k cos(beta_b) q.
+    # The torque is 50 Nm, the base radius 22.5688 mm, the tangential force k cos(beta_b) q.
     force, stiffness = 50.0 / 22.5688e-3, 13.3548e9 * 15e-3
     wanted = 1e6 * force / (stiffness * np.cos(np.radians(18.7472)))
     assert found.micrometres == pytest.approx([wanted, wanted], rel=1e-5)
@@ -202,7 +203,7 @@ def test_a_machine_without_gears_has_an_excitation_and_no_mesh():
 
 def test_a_machine_has_eigenfrequencies_without_contact_too():
     found = known(PAN2021.parent / "two_masses.toml")
-    # Masses of 1, springs of 1 between them and to the ground, hardly damped.
+    # The masses are 1, the springs between them and to the ground are 1, the damping is small.
     wanted = np.sqrt((3.0 + np.array([-1.0, 1.0]) * np.sqrt(5.0)) / 2.0)
     assert found.free[:, 0] == pytest.approx(wanted, rel=1e-3)
     assert found.texts["free"] == (

@@ -1,4 +1,4 @@
-"""The time response: what it keeps of a motion, its file, and the command that computes it."""
+"""The time response: the recorded motion, its file, and the command that computes it."""
 
 import shutil
 import subprocess
@@ -35,7 +35,7 @@ def at(*values: float) -> tuple[str, ...]:
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    """Give a motion in permanent contact, and one that hammers between both flanks."""
+    """Return a motion in permanent contact and a motion with impacts on both flanks."""
     return respond(load_config(FULL, at(0.2, 12.97)), PERIODS)
 
 
@@ -58,7 +58,7 @@ def test_the_sections_are_those_of_all_recorded_periods_and_meet_the_record(resu
 
 @pytest.mark.parametrize("coordinate", COORDINATES)
 def test_accelerations_are_the_derivative_of_the_velocities(result, coordinate):
-    """Differences of order 4: exact to (omega h)^4 / 30 for the fastest wave, the bearing's."""
+    """Differences of order 4 have the error (omega h)^4 / 30 for the fastest wave (bearing)."""
     rate, acceleration = (result[f"{coordinate}_{kind}"] for kind in ("rate", "acceleration"))
     step = result["mesh_period"][:, np.newaxis] / STEPS
     differences = 8.0 * (rate[:, 3:-1] - rate[:, 1:-3]) - (rate[:, 4:] - rate[:, :-4])
@@ -72,7 +72,7 @@ def test_accelerations_are_the_derivative_of_the_velocities(result, coordinate):
 
 
 def test_over_a_period_the_mesh_force_carries_the_load(result):
-    """The mean of eq. 13, row delta_5: cos(beta_b) N_y = f_n, for a motion of period 1."""
+    """The mean of eq. 13, row delta_5, is cos(beta_b) N_y = f_n for a motion of period 1."""
     load = result.parameters["load"].values
     angle = np.radians(result.parameters["base_helix_angle_deg"].values)
     force = result["mesh_force_tangential"][0, :STEPS]
@@ -87,11 +87,11 @@ def test_flow_maps_have_enough_samples_unless_their_steps_are_given(given, steps
 
 
 def test_a_response_of_flow_maps_is_as_exact_with_few_steps_as_with_many(tmp_path):
-    """A sum over the period of a smooth force has no error either."""
+    """A sum of a smooth force over the period has no error either."""
     found = []
     for steps in (24, 96):
         how = ("integration.method=flow_map", f"integration.steps_per_period={steps}", *SHORT[2:])
-        how += ("integration.transient_periods=8000",)  # The bearings are damped but little.
+        how += ("integration.transient_periods=8000",)  # The bearings have little damping.
         sets = [word for override in how for word in ("--set", override)]
         asked = [str(PAN2021), *sets, "--pitch-error", "0.2", "--periods", str(PERIODS), "-q"]
         assert main([*asked, "-o", str(tmp_path / f"{steps}.h5")]) == 0
@@ -116,7 +116,7 @@ def test_only_the_lane_that_hammers_loses_contact_and_reaches_the_back_flank(res
 
 
 def test_the_response_is_the_sweep_with_its_motion(result):
-    """Labels, exponents, sections and end states are those of the same lanes in a sweep."""
+    """Only the motion in time depends on the number of periods; all other arrays stay the same."""
     shorter = respond(load_config(FULL, at(0.2, 12.97)), 1)
     assert set(shorter) == set(result)
     for name in set(result) - {"time"}:

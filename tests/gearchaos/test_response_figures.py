@@ -1,4 +1,4 @@
-"""What the figures of a response show is what its file holds."""
+"""The figures of a response show the data of its file."""
 
 import re
 
@@ -34,7 +34,7 @@ TURN = 2.0 * np.pi
 
 
 def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -> Result:
-    """Make a response of period 3 and one that never repeats, of known waves."""
+    """Return a response of known waves: one motion has period 3, the other never repeats."""
     time = np.arange(-POINTS * STEPS, 0 + 1) / STEPS
     orders = np.array([[2.0 / 3.0], [np.sqrt(5.0) / 3.0]])
     waves = [
@@ -138,7 +138,7 @@ def heights(lines) -> dict[float, float]:
 
 
 def test_the_lines_of_the_spectrum_are_the_waves(axes, result):
-    """Eight periods do not hold a motion of period 3: six of them are transformed."""
+    """Eight periods are no multiple of period 3: six of them are transformed."""
     assert repeats_after(result, 0) == 3
     lines = heights(amplitude_spectrum(axes, result, 0, "delta_5"))
     high = {order: height for order, height in lines.items() if height > 1e-9}
@@ -159,7 +159,7 @@ def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
     assert axes.get_title("right") == "Hann window, 8 mesh periods"
     assert max(lines) <= 2.0
     assert lines[1.0] == pytest.approx(FAST, rel=0.05)
-    # Half of a line on each of those beside it is what the window of Hann makes of a wave.
+    # With a Hann window, a wave has half of its height on both neighbouring lines.
     assert [lines[0.875], lines[1.125]] == pytest.approx([FAST / 2.0] * 2, rel=0.2)
 
 

@@ -1,4 +1,4 @@
-"""The time response of a lane of a result: it continues from where the lane ended."""
+"""The time response of a lane continues from the end of the lane."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def config(*overrides: str):
 
 
 def going_on(folder: Path, result: Result, *at: str) -> Result:
-    """Save a result, and run the command on the lane at some coordinates."""
+    """Save a result, run the command on the lane at some coordinates, and return the response."""
     result.save(folder / "sweep.h5", overwrite=True)
     places = [word for text in at for word in ("--at", text)]
     output = str(folder / "response.h5")
@@ -49,7 +49,7 @@ def test_the_motion_goes_on_bit_for_bit_on_the_branch_of_the_lane(tmp_path, carr
     np.testing.assert_array_equal(found["delta_5"][0, 0], onwards.section[0, -5, 0])
     assert found.metadata["transient_periods"] == 0
     assert "continues from the end of the lane pitch_error = " in found.metadata["notes"]
-    # What the file says of itself computes the same again.
+    # The configuration in the file computes the same result again.
     again = run(load_config(_resolved(tmp_path, found)))
     np.testing.assert_array_equal(again["end_state"], onwards.end_state)
 

@@ -1,4 +1,4 @@
-"""A result over the product of its axes: shapes, slices, and the same in xarray."""
+"""A result over the product of its axes: shapes, slices, and equal slices in xarray."""
 
 import itertools
 import math
@@ -120,7 +120,7 @@ def test_a_slice_is_that_of_xarray(engine, result, tmp_path) -> None:
     result.save(tmp_path / "r.h5")
     wanted = {"pitch_error": 1.3, "load": 0.29, "start": 1}
     names = [name for name in result.axes if name in wanted]
-    # One axis, some of them, all of them; beyond the ends; halfway between two values.
+    # The places fix one axis, several or all axes, lie beyond the ends, or between two values.
     places = [{name: wanted[name] for name in names[:n]} for n in range(1, len(names) + 1)]
     places += [{"pitch_error": 99.0}, {"pitch_error": -5.0}, {"pitch_error": 0.75}]
     places += [{"pitch_error": -1e308}, {"pitch_error": 1e308}]

@@ -1,4 +1,4 @@
-"""Whatever is not a sound result file is refused with one sentence, soon and in little memory."""
+"""A file that is no sound result is refused with one sentence, quickly and with little memory."""
 
 import os
 import subprocess
@@ -65,7 +65,7 @@ def test_every_truncation_is_refused(good: Path, tmp_path: Path) -> None:
     content = good.read_bytes()
     cut = tmp_path / "cut.h5"
     whole = len(content) - CHECKSUM_LINE
-    # With less than the first word of the checksum line left, the file is one without that line.
+    # A file with less than the first word of the checksum line counts as a file without that line.
     ends = {0, 1, 7, 8, 9, 95, 96, *range(100, whole, 997), whole - 1, whole + 17}
     for end in sorted(ends | {len(content) - 50, len(content) - 1}):
         cut.write_bytes(content[:end])
@@ -127,7 +127,7 @@ def virtual(file: h5py.File) -> None:
 
 
 def scaled(name: str, shape: tuple[int, ...], dtype: str) -> Callable[[h5py.File], None]:
-    """Replace a variable by one of another shape or type whose dimensions have names."""
+    """Replace a variable by one of another shape or type; its dimensions have names."""
 
     def change(file: h5py.File) -> None:
         replace(name, data=np.ones(shape, dtype))(file)

@@ -1,4 +1,4 @@
-"""A result file holds what was put in, and any program for HDF5 or netCDF reads it."""
+"""A result file keeps the saved data, and any program for HDF5 or netCDF can read it."""
 
 import math
 import re
@@ -168,7 +168,7 @@ def test_xarray_reads_it_as_the_same_labelled_arrays(
         assert dataset.attrs["title"] == "Δ sweep"
         assert dataset.attrs["threads"] == 2
         assert dataset.attrs["configuration_resolved"] == result.metadata["configuration_resolved"]
-        # A text that is too long for an attribute; h5netcdf leaves it as bytes.
+        # The text is too long for an attribute; h5netcdf returns it as bytes.
         text = dataset["configuration"].item()
         text = text.decode() if engine == "h5netcdf" else text
         assert text == result.metadata["configuration"]
@@ -278,7 +278,7 @@ def test_ncdump_shows_the_dimensions(path: Path) -> None:
 
 
 def test_octave_loads_all_of_it(path: Path, result: Result) -> None:
-    # Octave ends with 0 and complains on stderr where it cannot load one of the datasets.
+    # If Octave cannot load a dataset, it prints an error on stderr and its exit code is 0.
     program = (
         f"s = load('{path}'); printf('%.17g %.17g ', s.section_delta_5(3, 5), s.parameters.load);"
         "printf('%d ', size(s.end_state), s.state, s.status(8), columns(s.configuration));"
@@ -318,7 +318,7 @@ def test_another_program_may_change_the_file(path: Path, tmp_path: Path) -> None
 @pytest.mark.parametrize("length", [1, 10_000])
 @pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
 def test_xarray_may_write_the_file_anew(engine: Any, length: int, tmp_path: Path) -> None:
-    # Both engines give some texts a variable length, netcdf4 those beyond ASCII only.
+    # Both engines store some texts with a variable length, netcdf4 only texts beyond ASCII.
     small = make_result(swept(count=8), configuration="# é\n" * length)
     small.save(tmp_path / "sweep.h5")
     with xr.open_datatree(tmp_path / "sweep.h5", engine=engine) as tree:
@@ -326,7 +326,7 @@ def test_xarray_may_write_the_file_anew(engine: Any, length: int, tmp_path: Path
     with xr.open_dataset(tmp_path / "sweep.h5", engine=engine) as root:
         root.load().to_netcdf(tmp_path / "root.h5", engine=engine)
     small.to_xarray().to_netcdf(tmp_path / "made.h5", engine=engine)
-    # To a tree, the swept one is the coordinate of the whole.
+    # In a tree, the swept parameter is a coordinate of the whole; the parameters lack it.
     left = {"tree": small.parameters.keys() - {"pitch_error"}}
     for name in ("tree", "root", "made"):
         anew = open_result(tmp_path / f"{name}.h5")
@@ -373,7 +373,7 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
         fill = "" if variable.fill_value is None else str(variable.fill_value)
         described = (short.get(dims, dims), variable.dtype, fill.replace("nan", "NaN"))
         assert documented.pop(short.get(name, name)) == described
-    # Those of which no such result is made by hand, from the catalogue.
+    # The result above lacks the outputs of these parts: compare them with the catalogue.
     for output in (*DIMENSION_PART.outputs, *CONTROL_PART.outputs):
         fill = "" if output.fill_value is None else "NaN"
         assert documented.pop(output.name) == ("axes", output.dtype, fill)

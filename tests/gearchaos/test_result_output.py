@@ -1,4 +1,4 @@
-"""A result appears complete or not at all, and nothing that was there before is ever lost."""
+"""A result file is written completely or not at all, and existing files are never lost."""
 
 import errno
 import os
@@ -48,7 +48,7 @@ def result(lanes):
 
 
 def run(program: str, *arguments: str | Path, limit: int | None = None) -> str:
-    """Run a program in a process of its own, which may be limited in the size of its files."""
+    """Run a program in a new process, optionally with a limit on the size of its files."""
 
     def restrict() -> None:
         if limit is not None:

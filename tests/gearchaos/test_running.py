@@ -1,4 +1,4 @@
-"""The Python interface: a configuration in, named arrays out, the same as the command's file."""
+"""The Python interface takes a configuration and returns the arrays of the command's file."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_the_number_of_threads_changes_no_bit(tmp_path, config):
         flags = ["--set", "sweep.count=300", "--threads", str(threads), "--output", f"{threads}.h5"]
         ended = sweep(tmp_path, *flags, "--quiet")
         if ended.code == 2:
-            pytest.skip("a single core")
+            pytest.skip("the machine has a single core")
         assert ended.code == 0
     one, two = (gearchaos.open_result(tmp_path / f"{threads}.h5") for threads in (1, 2))
     assert (one.metadata["threads"], two.metadata["threads"]) == (1, 2)
@@ -112,7 +112,7 @@ def test_a_carried_sweep_begins_where_its_neighbour_ended(config):
 
 
 def test_a_diverged_lane_leaves_its_neighbours_untouched(config):
-    # A load that drives a lane beyond every length scale.
+    # The first load drives its lane beyond every length scale.
     mixed, tame = (
         gearchaos.run(config(f"sweep={{parameter='load', values={values}}}"))
         for values in ([-1e150, 0.4, 0.5], [0.4, 0.5])

@@ -1,4 +1,4 @@
-"""The interactive page that explore saves: it loads nothing, is small, and its menu works."""
+"""The interactive page that explore saves loads nothing, is small, and its menu works."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +15,7 @@ from .commands import run_module, small_config
 from .listed_variables import sweep_variables
 from .test_explore import CHROMIUM, HOSTILE, OPTIONS, needs_browser
 
-pytestmark = pytest.mark.skipif(find_spec("bokeh") is None, reason="without bokeh")
+pytestmark = pytest.mark.skipif(find_spec("bokeh") is None, reason="bokeh is not installed")
 LOAD = "second_sweep={parameter='load', values=[0.1, 0.2]}"
 WIDE = 4000
 
@@ -36,7 +36,7 @@ def test_the_page_loads_nothing_and_every_entry_shows_one_chart(kind, folder):
     from playwright.sync_api import sync_playwright
 
     page = folder / f"{kind}.html"
-    # In a process without Panel, which adds models of its own to every page.
+    # The process does not import Panel, because Panel adds its own models to every page.
     words = [f"{kind}.h5", "--save", page.name]
     done = run_module("gearchaos.explore", *words, cwd=folder, imported=("bokeh",))
     assert (done.code, done.out) == (0, f"{page.name}\n")
@@ -51,7 +51,7 @@ def test_the_page_loads_nothing_and_every_entry_shows_one_chart(kind, folder):
         menu = opened.locator("select")
         menu.wait_for()
         shown = opened.locator(".bk-Figure:visible")
-        # A sweep has the chart of exponents below the chosen one.
+        # A sweep has the chart of exponents below the chosen chart.
         count = 1 if kind == "map" else 2
         for entry in menu.locator("option").all_inner_texts():
             menu.select_option(label=entry)
@@ -86,7 +86,7 @@ def test_a_large_sweep_is_thinned_and_keeps_periodic_points():
     assert len(static_page(result).encode()) <= LARGEST_PAGE
     x, y = _thinned(result, "section_delta_5", 20_000)
     assert x.size <= 20_000
-    # Both points of period 2 of every lane but the first, where they are the same.
+    # Every lane has both points of its period 2; in the first lane both points are equal.
     assert np.unique(x).size == WIDE
     assert {*np.sign(y[x == x.max()])} == {-1.0, 1.0}
     assert (np.unique(x[y > 0.0]) == np.unique(x[y < 0.0])).all()

@@ -1,4 +1,4 @@
-"""The whole program runs a model that it does not know: sweeps, labels, orbits, files."""
+"""The whole program runs an unknown model: sweeps, labels, orbits, files."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def result(request):
 
 
 def linear_response(frequency):
-    """Return x and x' at tau = 0 of the motion that never leaves the flank, in closed form."""
+    """Return x and x' at tau = 0 and the amplitude of a motion on the flank, in closed form."""
     wave = 0.1 / (1.0 - frequency**2 + 0.1j * frequency)
     return np.stack([1.1 + wave.real, -frequency * wave.imag], axis=1), np.abs(wave)
 

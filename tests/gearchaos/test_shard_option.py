@@ -1,4 +1,4 @@
-"""Several jobs share a sweep: each computes its shard of the blocks beside one output."""
+"""Several jobs share a sweep: each job computes its shard of the blocks of one output."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_p
         shard = f"{number}/3"
         ended = sweep(tmp_path, *asked, "--shard", shard, "--threads", threads)
         if ended.code == 2:
-            pytest.skip("a single core")
+            pytest.skip("the machine has a single core")
         assert ended == (0, f"{tmp_path / BLOCKS}\n", "")
         assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert run_module("gearchaos.merge", "gears.h5", "-q", cwd=tmp_path) == (0, "gears.h5\n", "")
@@ -79,8 +79,8 @@ def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
     assert "488 of 488 lanes" in again.err
     kept = sweep(tmp_path, *told, "--resume")
     assert kept.code == 0
-    assert "lanes/s" not in kept.err  # Nothing was left to be computed.
-    # A sweep of all shards takes over what there is.
+    assert "lanes/s" not in kept.err  # No lanes were left to compute.
+    # A sweep of all shards uses the finished blocks.
     assert sweep(tmp_path, *COUNT, "--resume") == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
 

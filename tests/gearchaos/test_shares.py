@@ -1,4 +1,4 @@
-"""Shares of the gear pairs that move in the same way: counted, with their confidence, and drawn."""
+"""Shares of gear pairs with the same motion: counts, confidence intervals and figures."""
 
 import csv
 import json
@@ -41,10 +41,11 @@ def known_motions(
     labelled: bool = True,
     contact: bool = True,
 ) -> Result:
-    """Make a result whose pairs come apart, double their period and become chaotic in turn.
+    """Return a result whose pairs lose contact, double their period and become chaotic in turn.
 
-    Of the pairs of value number n, n move chaotically, one with each of the periods 2, 3, 4 and 5
-    from the second value on, and one diverges at the last; twice n lose contact.
+    At value number n, counted from 0, n pairs are chaotic and 2 n pairs lose contact. From the
+    second value on, one pair has each of the periods 2, 3, 4 and 5. At the last value, one pair
+    diverges.
     """
     values = np.asarray(grades)
     axes = [coordinate("pitch_error_grade", "1", "accuracy grade of both gears", "", values)]
@@ -123,7 +124,7 @@ def test_contact_is_that_of_the_teeth_where_it_was_recorded():
     crossings = result.variables["crossings_per_period"]
     shape = result["crossings_per_period"].shape
     free, axial = np.zeros(shape), np.ones(shape)
-    # Lanes that float between the flanks all the time cross nothing.
+    # Lanes that stay between the flanks have no crossings.
     free[0] = 1.0
     times = {"time_apart_tangential": free, "time_apart_axial": axial}
     variables = [*result.variables.values(), *(replace(crossings, name=name) for name in times)]
@@ -294,7 +295,7 @@ def test_the_command_prints_shares_with_their_intervals(tmp_path, capsys):
     counted = motion_shares(result)
     lines = printed(path, capsys).splitlines()
     assert lines[0] == "shares over pitch_error_grade"
-    # Of the twenty lanes at the first value all have period 1 and keep contact.
+    # All twenty lanes at the first value have period 1 and keep contact.
     cells = re.split(r"\s\s+", lines[-3].strip())
     assert cells == ["5", "20", *["100.0% (83.9% to 100.0%)"] * 2]
     facts = json.loads(printed(path, capsys, "--json"))

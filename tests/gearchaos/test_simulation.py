@@ -1,4 +1,4 @@
-"""A configured sweep, computed block by block."""
+"""A configured sweep is computed block by block."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def test_blocks_feed_every_thread_and_carried_ones_hold_whole_steps(threads):
     carried = block_lanes(unlabelled(*RANDOM, "start.carry=both"), threads)
     assert carried >= 32 * threads
     assert carried % 6 == 0
-    # Where more lanes are side by side than a block holds, a step is divided.
+    # If more lanes are side by side than a block holds, a step is divided.
     many = unlabelled(*RANDOM, "start.carry=both", "start.count=5000")
     assert many.lanes.side_by_side == 10_000
     assert block_lanes(many, 1) < 5000
@@ -115,7 +115,7 @@ def test_a_line_of_two_parameters_is_the_sweep_of_that_line_bit_for_bit(override
     for number, frequency in enumerate((0.8, 0.9, 1.0)):
         one = unlabelled(TWO[1], f"groups.mesh_frequency={frequency}", *overrides)
         if "random" in str(overrides):
-            # The draws of a lane follow its number, which is another one here.
+            # Random starts depend on the number of the lane, which differs here.
             starts = both.lanes.start_of(np.arange(number * line, (number + 1) * line))
             one.lanes.start_of = lambda lanes, _system, starts=starts: starts[lanes].copy()
         mine = {name: array[number * line : (number + 1) * line] for name, array in whole.items()}

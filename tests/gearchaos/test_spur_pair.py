@@ -1,4 +1,4 @@
-"""The spur pair of Kahraman and Singh: the equation, its linear response, its softening jumps."""
+"""The spur pair of Kahraman and Singh: equation, linear response and softening jumps."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,7 +49,7 @@ class Oscillator:
         return rate, force - 2.0 * self.zeta * rate - stiffness * spring
 
     def run(self, start, frequency, periods):
-        """Integrate whole mesh periods; return x evenly in time and the state at the end."""
+        """Integrate whole mesh periods; return x at equal intervals of time, and the end state."""
         times = np.linspace(0.0, 2.0 * np.pi * periods / frequency, SAMPLES * periods + 1)
         tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "max_step": 10.0 * times[1]}
         motion = solve_ivp(
@@ -58,7 +58,7 @@ class Oscillator:
         return motion.y[0, :-1], motion.y[:, -1]
 
     def linear_response(self, frequency):
-        """Complex amplitude at constant stiffness while the teeth stay together."""
+        """Return the complex amplitude at constant stiffness while the teeth stay in contact."""
         forcing = self.forcing * frequency**2
         return forcing / (1.0 - frequency**2 + 2j * self.zeta * frequency)
 
@@ -79,7 +79,7 @@ def oscillator(sweep):
 
 @dataclass
 class Branches:
-    """The sweep upwards and downwards over the same mesh frequencies."""
+    """The upward and the downward sweep over the same mesh frequencies."""
 
     pair: Oscillator
     frequency: np.ndarray
@@ -110,7 +110,7 @@ def shipped():
 
 
 def test_the_model_is_the_classical_equation():
-    # A light load and a strong forcing: contact is lost and made on both flanks.
+    # With a light load and a strong forcing, contact is lost and made on both flanks.
     periods = 6
     sweep = simulation(
         "sweep={parameter='mesh_frequency', values=[0.6, 0.9, 1.4]}",
@@ -136,7 +136,7 @@ def test_response_is_linear_while_the_teeth_stay_together():
     pair, arrays = oscillator(sweep), computed(sweep, 111)
     assert not arrays["crossings_per_period"].any()
     response = pair.linear_response(values_of(sweep))
-    # The section lies at phase 0, where x shows the real part and x' the imaginary one.
+    # The section is taken at phase 0: x gives the real part and x' the imaginary part.
     x, rate = arrays["end_state"].T
     found = x - (1.0 + pair.load) - 1j * rate / values_of(sweep)
     assert np.abs(found - response).max() < 1e-6
@@ -157,7 +157,7 @@ def test_sweeps_differ_in_one_interval_below_resonance(scene, first, last, reque
     apart = np.flatnonzero(both.apart)
     assert both.frequency[apart[[0, -1]]] == pytest.approx([first, last])
     assert np.array_equal(apart, np.arange(apart[0], apart[-1] + 1))
-    # The lower branch keeps contact, but for a little just before it jumps.
+    # The lower branch keeps contact except shortly before its jump.
     assert not both.up["crossings_per_period"][apart[: apart.size // 2]].any()
     assert (both.down["crossings_per_period"][apart] == 2.0).all()
 
@@ -171,7 +171,7 @@ def test_every_motion_of_the_run_up_repeats_each_mesh_period(scene, request):
 
 
 def amplitude_of(both, arrays, index):
-    """Amplitude of the first harmonic on an orbit, followed by the equation written out here."""
+    """Return the amplitude of the first harmonic of an orbit, integrated with `Oscillator`."""
     start = arrays["end_state"][index]
     x, end = both.pair.run(start, both.frequency[index], 1)
     assert end == pytest.approx(start, abs=1e-5)
@@ -185,13 +185,13 @@ def test_the_peak_leans_to_lower_frequencies(constant):
     assert peak > 4.0 * amplitude_of(constant, constant.up, first)
     assert peak > amplitude_of(constant, constant.down, last)
     assert peak > 1.5 * amplitude_of(constant, constant.down, resonance)
-    # The clearance takes the resonance at 1 away.
+    # The clearance removes the resonance at 1.
     without_clearance = constant.pair.forcing / (2.0 * constant.pair.zeta)
     assert amplitude_of(constant, constant.down, resonance) < 0.5 * without_clearance
 
 
 def harmonic_balance(pair, amplitude):
-    """Frequencies at which mean and first harmonic balance, with contact on one flank only."""
+    """Return the frequencies at which mean and first harmonic balance, in contact on one flank."""
     angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
 
     def spring(mean):
@@ -211,7 +211,7 @@ def harmonic_balance(pair, amplitude):
 
 @pytest.mark.parametrize(("frequency", "share"), [(0.75, 0.02), (0.82, 0.02), (1.3, 0.002)])
 def test_harmonic_balance_finds_the_branch_that_loses_contact(constant, frequency, share):
-    # One harmonic: what it neglects shrinks with the part of the period without contact.
+    # With one harmonic, the error shrinks with the part of the period without contact.
     index = np.argmin(np.abs(constant.frequency - frequency))
     amplitude = amplitude_of(constant, constant.down, index)
     found = harmonic_balance(constant.pair, amplitude)
@@ -236,7 +236,7 @@ def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
         "sweep={parameter='stiffness_variation_scale', values=[0.5, 1.0, 1.5, 2.1]}",
     )
     arrays = computed(sweep)
-    # To first order, the principal parametric resonance grows at k_1/4 - zeta.
+    # To first order, the principal parametric resonance grows at the rate k_1/4 - zeta.
     growth = 0.1 * values_of(sweep) / 4.0 - sweep.lanes.parameters["damping_ratio"].values
     assert arrays["lyapunov_exponent"][:3] == pytest.approx(growth[:3], abs=1e-4)
     assert not arrays["crossings_per_period"][:3].any()
@@ -265,7 +265,7 @@ def test_a_resonance_that_outgrows_the_clearance_is_distinguished_from_chaos():
     )
     lanes = computed(plan_run(load_config(SPUR_PAIR, changes)))
     assert lanes["motion"].tolist() == [GROWS, PERIODIC]
-    # Where the clearance is nothing beside the motion, it grows as the linear equation does.
+    # A motion much larger than the clearance grows as in the linear equation.
     assert lanes["lyapunov_exponent"][0] == pytest.approx(np.log(multiplier) / period, rel=1e-6)
 
 
@@ -299,7 +299,7 @@ def test_a_sweep_of_the_module_of_a_spur_pair_keeps_its_stiffness():
     config = Configuration.from_toml(TRAPEZOID)
     swept = groups_at(config, axis_values(config))
     assert np.ptp(swept.mesh_frequency) > 0.0
-    # The contact ratio in multiples of the module: it does not depend on it.
+    # Tooth heights are multiples of the module: the contact ratio does not depend on the module.
     one = groups_at(config.at({"pair.normal_module_mm": 2.0}), {})
     cosine, sine = (np.tile(wave, (50, 1)) for wave in (one.stiffness_cosine, one.stiffness_sine))
     np.testing.assert_allclose(swept.stiffness_cosine, cosine, rtol=0.0, atol=1e-13)

@@ -1,4 +1,4 @@
-"""The fewest stable steps: known limits, and limits found by integrating on either side of them."""
+"""The fewest stable steps agree with known limits and with integrations on both sides."""
 
 import itertools
 
@@ -42,7 +42,7 @@ def fewest(effects: Effects, groups: Groups) -> np.ndarray:
 
 
 def oscillator(damping_ratio, mesh_frequency=0.01) -> Groups:
-    """A spur pair: delta_5'' + 2 xi delta_5' + delta_5 = 0."""
+    """Return a spur pair: delta_5'' + 2 xi delta_5' + delta_5 = 0."""
     return pan2021(
         1.0, damping_ratio=damping_ratio, mesh_frequency=mesh_frequency, base_helix_angle=0.0
     )
@@ -79,7 +79,7 @@ def test_the_stiffest_moment_of_the_mesh_decides():
 
 
 def test_a_mode_that_grows_by_itself_sets_no_limit():
-    # Mesh stiffness -0.5 at its lowest: exponents +-0.7, beside the oscillation at 1.5.
+    # The lowest mesh stiffness, -0.5, has the exponents +-0.7; the highest sets the limit.
     model = oscillator(0.0)._replace(stiffness_variation_scale=np.ones(1))
     scene = TORSION._replace(stiffness_variation=True)
     found = fewest_stable_steps(GearPairs(scene, model, np.array([1.5]), np.zeros(1)))
@@ -99,7 +99,7 @@ def test_limit_of_every_scene_is_that_of_its_whole_jacobian(scene):
         demand = np.maximum(demand, steps_per_time(np.linalg.eigvals(whole)).max(axis=1))
     wanted = 2.0 * np.pi / model.mesh_frequency * demand
     found = fewest(scene, model)
-    # Stiffness sampled on another grid, and rounding up to whole steps.
+    # The tolerances cover another sampling of the stiffness, and rounding up to whole steps.
     assert np.all(found >= wanted * (1.0 - 1e-3))
     assert np.all(found <= wanted * (1.0 + 1e-3) + 1.0)
 
@@ -157,7 +157,7 @@ def test_lanes_that_share_some_groups_but_not_all_are_distinguished():
 
 
 def test_friction_stiffens_the_mesh_on_one_side_of_the_pitch_point():
-    # delta_5'' = -cos(beta_b) (1 + mu lambda) delta_5, and RK4 ends at sqrt(8) on that axis.
+    # delta_5'' = -cos(beta_b) (1 + mu lambda) delta_5; on that axis RK4 is stable up to sqrt(8).
     share, cosine = 0.5, np.cos(BASE_HELIX_ANGLE)
     model = pan2021(1.0, damping_ratio=0.0, friction_coefficient=share, friction_lever=1.0)
     wanted = PERIOD * 100.0 * np.sqrt(cosine * (1.0 + share) / 8.0)
@@ -207,7 +207,7 @@ def test_steps_are_raised_to_the_limit_of_the_strictest_lane():
     )
     steps = fewest_stable_steps(raised.lanes.system_of(np.arange(60)))
     assert raised.plan.steps_per_period == steps.max()
-    # At the limit itself, exponents are not to be trusted: the second note.
+    # The second note: exponents are inaccurate at the limit itself.
     note, further = raised.notes
     assert "shift Lyapunov exponents" in further
     assert f"raised from 60 to {steps.max()}" in note
@@ -239,7 +239,7 @@ def test_more_flow_maps_than_are_kept_are_reported():
         ([swept, finer], True),
         ([swept, "integration.steps_per_period=12"], False),
         ([finer], False),
-        # Not even where those of one lane are more: all lanes share them.
+        # One lane has more maps than are kept, but all lanes share them.
         (["integration.steps_per_period=25000"], False),
         ([swept, finer, "outputs.loads=true"], True),
         ([swept, finer, "integration.method=rk4"], False),

@@ -11,7 +11,7 @@ from gearchaos.dynamics.stability import steps_per_time
 def test_a_ray_leaves_the_stable_region_exactly_once(angle):
     direction = np.exp(1j * angle)
     limit = 1.0 / steps_per_time(np.array([direction]))[0]
-    # The length of the ray is interpolated; on the imaginary axis 1 - |R| is rounding near 0.
+    # The length of the ray is interpolated; on the imaginary axis 1 - |R| is only rounding near 0.
     assert np.all(amplification(np.linspace(0.0, limit, 4000) * direction) <= 1.0 + 1e-7)
     assert np.all(amplification(np.linspace(limit + 1e-6, 20.0, 40_000) * direction) > 1.0)
 

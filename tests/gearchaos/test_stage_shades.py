@@ -1,4 +1,4 @@
-"""Stages are shaded behind a diagram where its lanes lie, and named in a legend."""
+"""Stages are shaded behind the lanes of a diagram and named in a legend."""
 
 from itertools import combinations
 
@@ -22,7 +22,7 @@ KINDS |= {letter: (kind, 0) for kind, letter in enumerate("qcudg", 1)}
 
 
 def result_of(labels: str, *, labelled: bool = True) -> Result:
-    """A sweep over 0, 1, 2, ... whose lanes have labels of one letter."""
+    """Return a sweep over 0, 1, 2, ...; each letter is the label of a lane."""
     variables = sweep_variables(
         [coordinate("load", "1", "static load", "", np.arange(float(len(labels))))],
         states=["delta_5", "delta_5_rate"],
@@ -97,13 +97,13 @@ def test_what_is_too_narrow_to_be_seen_is_left_out():
 
 @pytest.mark.parametrize(("labels", "kind"), [("1c11", "period 1"), ("1c1c1", "several motions")])
 def test_a_stage_that_hides_too_many_others_says_so(labels, kind):
-    """Three of four lanes are a stage; three of five are several motions."""
+    """Three of four lanes make a stage; three of five lanes make a stage of several motions."""
     figure, _, _ = shaded(labels, (0.0, 600.0))
     assert named_by(figure) == [kind]
 
 
-# Machado, Oliveira, Fernandes 2009, severity 1: linear RGB of everybody, and of those who lack the
-# cones for long, middle and short waves.
+# Machado, Oliveira, Fernandes 2009, severity 1: linear RGB of normal vision, and of vision without
+# the cones for long, middle and short waves.
 COLOUR_BLIND = np.fromstring(
     """
     1 0 0  0 1 0  0 0 1
@@ -116,7 +116,7 @@ COLOUR_BLIND = np.fromstring(
 
 
 def lab(colour: str, seen_through: np.ndarray) -> np.ndarray:
-    """CIE L*a*b* of a colour, white D65."""
+    """Return CIE L*a*b* of a colour, with the white point D65."""
     rgb = np.array(to_rgb(colour))
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
@@ -125,7 +125,7 @@ def lab(colour: str, seen_through: np.ndarray) -> np.ndarray:
 
 
 def test_shades_without_the_same_hatching_are_distinguished_in_grey_and_by_the_colour_blind():
-    """A difference of 2.3 is just noticeable side by side; three of them are seen across a page."""
+    """A difference of 2.3 is just visible side by side, three times as much across a page."""
     hatches = [HATCHES.get(kind) for kind in SHADES]
     assert len({*hatches}) == len(HATCHES) + 1
     plain = [colour for kind, colour in SHADES.items() if kind not in HATCHES]
@@ -143,7 +143,7 @@ def test_a_result_without_labels_cannot_be_shaded():
 
 
 def test_values_of_somebody_else_are_ticked_and_named():
-    """Marks of a paper stand at its values at the upper edge, and the legend keeps its entries."""
+    """Marks lie at the values of a paper, at the upper edge; the legend keeps its entries."""
     figure = Figure(layout="constrained")
     panels = figure.subplots(2)
     for axes in panels:

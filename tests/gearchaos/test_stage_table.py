@@ -1,4 +1,4 @@
-"""Stages are the stretches of equal labels; narrow ones go into what surrounds them."""
+"""Stages are runs of equal labels; narrow stages are merged into their neighbours."""
 
 from heapq import heappop
 from itertools import pairwise
@@ -27,7 +27,7 @@ from .test_result_axes import AXES, ERRORS, LOADS, result_over
 
 
 def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:
-    """Lanes with labels of one letter: a digit is a period, c is chaotic."""
+    """Return lanes with labels of one letter: a digit is a period, c is chaotic."""
     words = [label_text("chaotic", int(letter) if letter.isdigit() else 0) for letter in labels]
     return LabelledLanes(
         np.arange(float(len(labels))) if values is None else np.array(values),
@@ -76,7 +76,7 @@ def test_one_lane_is_one_stage():
 def test_a_window_goes_into_the_chaos_on_both_sides():
     (before, chaos) = stage_table(lanes("1111ccc3ccc6cccc"), narrowest=1.5)
     assert shown([before, chaos]) == [("period 1", 0.0, 3.0), ("chaotic", 4.0, 15.0)]
-    # The windows at 4 and 8 lanes after the first do not count as exponents of the chaos.
+    # The windows, with the exponents 4 and 8, do not count as exponents of the chaos.
     assert chaos.lowest_exponent == 1.0
     assert chaos.lanes == 12
 
@@ -98,7 +98,7 @@ def test_a_cascade_of_narrow_stages_ends_where_it_belongs():
 def test_the_width_is_that_of_the_axis_and_reaches_halfway_to_the_neighbours():
     values = [0.0, 1.0, 10.0, 11.0, 12.0]
     uneven = lanes("11c22", values)
-    # From 5.5 to 10.5.
+    # The chaotic stage extends from 5.5 to 10.5.
     assert len(stage_table(uneven, narrowest=4.9)) == 2
     assert [s.label for s in stage_table(uneven, narrowest=1.6)] == ["period 1", "chaotic"]
 
@@ -119,7 +119,10 @@ def test_labels_are_worded(meaning, period, text):
 
 
 def slow_twin(lanes: LabelledLanes, narrowest: float) -> list[list[int]]:
-    """First lane, lane after the last, lane with the label: rule by rule."""
+    """Return the first lane, the lane after the last and the lane with the label of each stage.
+
+    The rule is applied step by step.
+    """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]
     parts = [[a, b, a] for a, b in pairwise(edges)]
@@ -182,7 +185,7 @@ def test_each_lane_is_looked_at_a_few_times_however_many_stages_alternate(narrow
     stages = stage_table(some._replace(labels=some.labels.view(Counting)), narrowest)
     assert sum(stage.lanes for stage in stages) == 20_000
     assert looked_at <= 5 * 20_000
-    # Each merger takes at least one of the stretches away, and puts one back.
+    # Each merger removes at least one run and puts one back.
     assert pops <= 2 * 20_000
 
 

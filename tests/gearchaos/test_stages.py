@@ -1,4 +1,4 @@
-"""The stages command: a table from the file alone, and boundaries refined with the engine."""
+"""The stages command prints a table from the file alone and refines boundaries with the engine."""
 
 import json
 import subprocess
@@ -67,7 +67,7 @@ def test_boundaries_are_refined_and_the_period_doubling_is_reported(folder):
     facts = json.loads(ended.out)
     doubling = facts["boundaries"][0]
     assert 0.0 < doubling["above"] - doubling["below"] <= 0.002
-    # Newton's method and the multipliers alone put it at 10.268.
+    # Newton's method and the multipliers alone give 10.268.
     assert doubling["below"] <= 10.268 <= doubling["above"]
     assert doubling["lost_at"] == pytest.approx(10.268, abs=1e-3)
     assert doubling["label_below"] == "period 1"
@@ -82,7 +82,7 @@ def test_boundaries_are_refined_and_the_period_doubling_is_reported(folder):
 
 
 def test_a_start_of_a_grid_is_refined_as_it_started():
-    """Of pan2021_first.toml a start at rest hops at 1.044."""
+    """In pan2021_first.toml, a start at rest jumps at 1.044."""
     grid = (
         "sweep={parameter='pitch_error', values=[1.04, 1.05]}",
         "start={kind='grid', count=3, box={delta_5=[-1.0, 1.0]}}",
@@ -189,7 +189,7 @@ def test_a_slice_is_named_and_the_first_one_is_not_all(several, tmp_path):
     ]
     facts = listed(tmp_path)
     assert facts["slice"] == {"load": 0.1}
-    # Two starts at each value.
+    # There are two starts at each value.
     assert sum(stage["lanes"] for stage in facts["stages"]) == 2 * several["pitch_error"].size
 
 
@@ -247,7 +247,7 @@ def test_a_slice_that_there_is_not_is_refused(tmp_path, at, words):
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_slice_of_two_parameters_is_refined_where_it_was_taken(tmp_path, method):
-    damping = 0.025819888974716113  # That of the file.
+    damping = 0.025819888974716113  # The value of the file.
     where = [
         "sweep={parameter='pitch_error', values=[10.2, 10.3]}",
         f"second_sweep={{parameter='damping_ratio', values={[damping, 2.0 * damping]}}}",

@@ -1,4 +1,4 @@
-"""The states in which the lanes of a sweep start."""
+"""The start states of the lanes of a sweep."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Extremes and amplitudes of a lane in a result: names, files, units, the waterfall, refusals."""
+"""Extremes and amplitudes of a lane: names, files, units, the waterfall, and refusals."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_a_file_keeps_what_is_reported(result, path):
     assert (largest >= section.max(axis=1)).all()
     assert height == pytest.approx(largest - smallest)
     error = result["amplitude_transmission_error"]
-    # The lines of a motion carry no more than all of it.
+    # The lines of a motion have at most the mean square of the whole motion.
     squares = (error**2).sum(axis=1) / 2.0
     assert (squares <= result["transmission_error_rms"] ** 2 * (1.0 + 1e-6)).all()
     assert squares == pytest.approx(result["transmission_error_rms"] ** 2, rel=0.05)
@@ -101,7 +101,7 @@ def test_the_waterfall_has_a_row_for_each_order(result, path, capsys):
     image = waterfall(axes, result, "amplitude_delta_5")
     assert image.get_array().shape == (4, 4)
     assert [label.get_text() for label in axes.get_yticklabels()] == ["1/2", "1", "3/2", "2"]
-    # Nothing is drawn below the fifth decade.
+    # Values more than five decades below the largest one are not drawn.
     most = result["amplitude_delta_5"].max()
     assert image.get_array().min() == pytest.approx(max(1e-5 * most, image.norm.vmin))
     assert image.get_array().max() == most == image.norm.vmax

@@ -1,4 +1,4 @@
-"""Steps per period that nobody gives are chosen, and those that are too coarse are named."""
+"""Steps per period are chosen if none are given; given steps that are too coarse are reported."""
 
 import re
 
@@ -25,7 +25,7 @@ from .random_pairs import random_configuration
 from .short_sweeps import PAN2021
 
 COARSE = [38, 104, 106, 137, 149, 293]
-"""Pairs that are stable with 200 steps, and wrong by more than 1 %."""
+"""Pairs that are stable with 200 steps and have an error of more than 1 %."""
 
 UNSTABLE = [14, 64, 284]  # Pairs for which 200 steps are too few to be stable.
 ORDINARY = [0, 1, 2, 30, 31, 32]
@@ -37,7 +37,7 @@ def prepared(number: int, steps: int | None = None) -> RunPlan:
 
 
 def error_with(simulation: RunPlan, steps: int) -> float:
-    """Return the error after the last period against eight times the steps that were chosen."""
+    """Return the error after the last period compared with eight times the chosen steps."""
     lane = np.arange(1)
     system, start = simulation.lanes.system_of(lane), simulation.lanes.start_of(lane)
     plan = simulation.plan._replace(
@@ -58,7 +58,7 @@ def told(simulation: RunPlan, words: str) -> list[str]:
 def test_no_pair_is_wrong_with_the_steps_that_are_chosen_for_it(number):
     simulation = prepared(number)
     steps = simulation.plan.steps_per_period
-    # 200, doubled so many times as it takes.
+    # The steps are 200, doubled as often as necessary.
     assert steps % 200 == 0 and (steps // 200).bit_count() == 1
     assert error_with(simulation, steps) < WRONG
     (note,) = told(simulation, f"integration.steps_per_period = {steps}, chosen for this scene")
@@ -87,7 +87,7 @@ def test_a_given_number_that_is_fine_enough_is_not_spoken_of(number):
 def test_the_error_that_is_reported_is_that_against_much_finer_steps(number):
     simulation = prepared(number)
     trial = Trial(simulation.lanes, simulation.plan)
-    # Twice the steps leave a sixteenth of the error, or more where they are not yet fine enough.
+    # Twice the steps leave a sixteenth of the error, or more if they are still too coarse.
     for steps in (400, 800):
         found = trial.verdict(steps).error[0]
         assert found == pytest.approx(error_with(simulation, steps), rel=0.1)
@@ -97,8 +97,8 @@ def test_chaos_is_reported_and_does_not_ask_for_ever_more_steps():
     simulation = prepared(356)
     trial = Trial(simulation.lanes, simulation.plan)
     verdict = trial.verdict(200)
-    # Its tangent vector grows e^10 times, and with it an error that no step could avoid. A norm of
-    # other weights differs by a factor, not by an order of magnitude.
+    # The tangent vector grows e^10 times. Any error grows as much, with any number of steps. A norm
+    # with other weights differs by a factor, not by an order of magnitude.
     grown = integrate(
         simulation.lanes.system_of(np.arange(1)), np.zeros((1, 10)), Plan(1600, 0, 12, 0, True)
     ).growth.sum()
@@ -107,7 +107,7 @@ def test_chaos_is_reported_and_does_not_ask_for_ever_more_steps():
     assert simulation.plan.steps_per_period == 200
     (note,) = simulation.notes
     assert "in 1 of them any error grows more than 100 times" in note
-    # The same where the number is given, and the error is one to speak of.
+    # A given number of steps has the same note; its error is large enough to be reported.
     coarse = prepared(356, 100)
     (note,) = told(coarse, "any error grows")
     assert coarse.plan.steps_per_period == 100 and "off by up to" in note
@@ -138,7 +138,8 @@ def test_a_motion_at_rest_has_no_error_to_judge():
 
 
 def test_the_lane_with_the_fastest_mode_is_tried_wherever_it_is():
-    # The lowest mesh frequency with the stiffest bearing: neither the first lane nor the last.
+    # The fastest lane has the lowest mesh frequency and the stiffest bearing. It is neither the
+    # first lane nor the last.
     swept = (
         "sweep={parameter='mesh_frequency', from=0.5, to=1.5, count=101}",
         "second_sweep={parameter='transverse_stiffness_p', from=1.0, to=5000.0, count=5}",
@@ -150,7 +151,7 @@ def test_the_lane_with_the_fastest_mode_is_tried_wherever_it_is():
     assert fastest not in simulation.lanes.spread(48)
     trial = Trial(simulation.lanes, simulation.plan)
     assert fastest in trial.numbers and trial.numbers.size == 49
-    # An undamped mode is stable up to sqrt(8) a step.
+    # An undamped mode is stable up to a phase of sqrt(8) per step.
     limit = 2.0 * np.pi / 0.5 * np.sqrt(5000.0 / 8.0)
     assert trial.limit == pytest.approx(limit, rel=0.02)
 
@@ -158,7 +159,7 @@ def test_the_lane_with_the_fastest_mode_is_tried_wherever_it_is():
 def test_a_sweep_records_and_prints_its_choice_and_shards_agree_on_it(tmp_path):
     config = small_config(tmp_path)
     text = config.read_text("utf-8").replace("steps_per_period = 40\n", "")
-    # For a phase a loop of its own would be compiled.
+    # A phase would need another compiled loop.
     text = text.replace("phase_deg = 30.0", "phase_deg = 0.0")
     config.write_text(text.replace("speed_rpm = 8000.0", "speed_rpm = 150.0"), "utf-8")
     few = ("gears.toml", "--set", "sweep.count=4")
@@ -174,7 +175,7 @@ def test_a_sweep_records_and_prints_its_choice_and_shards_agree_on_it(tmp_path):
     assert one.metadata["steps_per_period"] == joined.metadata["steps_per_period"] == int(printed)
     assert "chosen for this scene" in one.metadata["notes"] == joined.metadata["notes"]
     assert one["end_state"].tobytes() == joined["end_state"].tobytes()
-    # What is computed of a result takes the same steps, and a system as many as its sweep.
+    # A system of the result takes the same steps, a system of a configuration as many as its sweep.
     system = gearchaos.System.of_lane(one, pitch_error=0.0)
     assert system.integrate(1).states.shape[0] == int(printed) + 1
     free = gearchaos.load_config(config, ["sweep={parameter='pitch_error',values=[5.0]}"])

@@ -1,4 +1,4 @@
-"""With a tolerance, the number of steps is measured and not guessed."""
+"""With a tolerance, the number of steps follows from measured errors."""
 
 import re
 
@@ -24,12 +24,12 @@ SHORT = (
 
 
 def tried_steps(notes: list[str]) -> list[int]:
-    """Return the numbers of steps that notes say were measured."""
+    """Return the numbers of steps whose errors were measured, as the notes report."""
     return [int(note.split()[0]) for note in notes if "wanted is" in note]
 
 
 def method_of_order_four(steps: int) -> Solution:
-    """Lanes of period 1 whose section and exponent have the error 100 steps^-4."""
+    """Return lanes of period 1 whose section and exponent have the error 100 steps^-4."""
     error = 100.0 * steps**-4.0
     lanes = np.linspace(0.5, 1.5, 20)
     section = np.repeat((lanes + error)[:, np.newaxis, np.newaxis], 48, axis=1)

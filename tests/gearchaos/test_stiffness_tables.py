@@ -1,4 +1,4 @@
-"""A stiffness from a table over the mesh period: its Fourier series, its file, its faults."""
+"""A stiffness from a table over the mesh period: Fourier series, file and faults."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def stiffness(phase):
 
 
 def uneven(points):
-    """Return uneven phases within a mesh period, not from zero on."""
+    """Return uneven phases of a mesh period that do not begin at zero."""
     even = np.arange(points) / points
     return even + 0.08 * np.sin(2.0 * np.pi * even) - 0.3
 
@@ -44,13 +44,13 @@ def test_a_table_of_few_harmonics_gives_these_exactly(phase):
 
 def test_the_series_is_the_shortest_one_within_the_bound():
     phase = np.arange(360) / 360
-    # One and two pairs of teeth in turn, with transitions of a twelfth of a period.
+    # One and two pairs of teeth alternate, with transitions of a twelfth of a period.
     values = np.interp(phase, [0, 1 / 12, 0.6, 0.6 + 1 / 12, 1], [1.0, 1.8, 1.8, 1.0, 1.0])
     transform = np.fft.rfft(values) / 360
     squares = 2.0 * np.abs(transform[1:]) ** 2
     for bound in (0.05, 0.01, 0.003):
         series = series_of(tuple(phase), tuple(values), bound, 40)
-        # Parseval: the harmonics that are left out are the deviation.
+        # By Parseval's theorem, the omitted harmonics are the deviation.
         left = np.sqrt(squares[series.harmonics :].sum()) / transform[0].real
         assert series.error == pytest.approx(left, rel=0.02)
         shorter = np.sqrt(squares[series.harmonics - 1 :].sum()) / transform[0].real
@@ -69,7 +69,7 @@ def test_the_series_is_the_shortest_one_within_the_bound():
         ("c_gamma [N/(mm·µm)]", "N/(um mm)"),
         ("c [N/(mm um)]", "N/(um mm)"),
         ("c [N/mm/um]", "N/(um mm)"),
-        # Only the beginning of each is a unit that is known.
+        # Only the beginning of these headings is a known unit.
         ("c [N/(um cm)]", ""),
         ("c [N/(mm mm)]", ""),
         ("c [N/mm^2]", ""),
@@ -108,7 +108,7 @@ def test_a_machine_takes_a_table_and_its_result_keeps_the_file(tmp_path):
     config = machine("fit_error = 1e-9, file = 'k.csv'", str(tmp_path))
     waves = config.clearance["stop"].waves
     assert waves.cosine == pytest.approx(COSINE, abs=1e-9)
-    # Nothing is read but the text that is kept.
+    # The text that is kept is sufficient: no file is read.
     again = gearchaos.Configuration.from_toml(config.text, "kept.toml")
     assert again.clearance == config.clearance
     listed = machine(
@@ -214,7 +214,7 @@ def train(**mesh):
 def test_a_mesh_of_a_train_takes_a_table():
     usual = gearchaos.load_config(SWEEPS / "two_stage.toml")
     usual = usual.replace("mesh.first.phase_turns", 0.2).replace("mesh.first.harmonics", 4)
-    # The series of one and two tooth pairs in turn, as a table.
+    # The table has the series of one and two tooth pairs that alternate.
     number, phase = np.arange(1, 5), np.arange(48) / 48
     waves = np.cos(2.0 * np.pi * np.outer(phase, number)) @ (np.sinc(1.6 * number))
     table = {"phase": phase.tolist(), "values": (350e3 * (1.0 + 2.0 * waves)).tolist()}

@@ -1,4 +1,4 @@
-"""Standard streams that are closed or full cost messages, not results."""
+"""Closed or full standard streams lose messages, not results."""
 
 import io
 import subprocess
@@ -22,12 +22,12 @@ def shell(folder, redirection: str, *arguments: str) -> subprocess.CompletedProc
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="no device is always full elsewhere")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /dev/full")
 @pytest.mark.parametrize("redirection", [*CLOSED, *FULL])
 def test_a_sweep_writes_its_result_whatever_becomes_of_its_messages(tmp_path, redirection):
     small_config(tmp_path)
     ended = shell(tmp_path, redirection, "gearchaos.sweep", "gears.toml", *FEW)
-    # The path of the result could not be printed where stdout is full.
+    # The path of the result cannot be printed if stdout is full.
     assert ended.returncode == (4 if redirection == ">/dev/full" else 0)
     assert ended.stdout == ("one.h5\n" if redirection.startswith("2>") else "")
     assert ("3 lanes, 0 diverged" in ended.stderr) == (redirection == ">&-")
@@ -36,7 +36,7 @@ def test_a_sweep_writes_its_result_whatever_becomes_of_its_messages(tmp_path, re
     assert same_data(result, gearchaos.run(config))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="no device is always full elsewhere")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /dev/full")
 @pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
 @pytest.mark.parametrize(
     ("arguments", "code"),
@@ -51,7 +51,7 @@ def test_the_exit_code_is_reported_without_stderr(tmp_path, redirection, argumen
     assert bool(ended.stdout) == (code == 0)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="no device is always full elsewhere")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /dev/full")
 @pytest.mark.parametrize("option", ["--help", "--version"])
 def test_an_overview_that_cannot_be_printed_is_code_4(tmp_path, option):
     ended = shell(tmp_path, ">/dev/full", "gearchaos", option)

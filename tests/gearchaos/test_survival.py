@@ -1,4 +1,4 @@
-"""Chaos that ends is told from chaos that lasts by letting it go on."""
+"""Transient chaos is distinguished from lasting chaos by longer integration."""
 
 import json
 
@@ -13,7 +13,7 @@ from .short_sweeps import PAN2021
 
 LASTING = 13.4
 FADING = (14.82, 14.87, 14.9)
-"""Here chaos lives for a thousand periods or so: within 6000 it comes to rest on a period 1."""
+"""Values at which chaos lasts about a thousand periods: within 6000 it settles on period 1."""
 
 SHORT = (
     "integration.transient_periods=100",

@@ -1,4 +1,4 @@
-"""The sweep command: what it prints where, what it writes, and how it ends."""
+"""The sweep command: its output on stdout and stderr, its files, and its exit codes."""
 
 import json
 import os
@@ -112,9 +112,10 @@ def test_a_dry_run_reports_lanes_steps_memory_and_time_and_writes_nothing(tmp_pa
     assert told.pop("effects").startswith("pitch_error, stiffness_variation, backlash")
     assert re.fullmatch(r"about [\d.]+MB at the peak of the process", told.pop("memory"))
     assert re.fullmatch(r"about \d+\.\d s with \d+ threads?", told.pop("time"))
-    # Per lane: 2 x 5 section points, exponent, its error, crossings, their speed, 10 states at
-    # the start and 10 at the end, return distance; unsplit steps, period of divergence and of the
-    # motion, bands; status, kind of motion, kind of record.
+    # Per lane 35 numbers of 8 bytes: 2 x 5 section points, exponent, its error, crossings, their
+    # speed, 10 states at the start and 10 at the end, return distance; 4 of 4 bytes: unsplit steps,
+    # period of divergence and of the motion, bands; 3 of 1 byte: status, kind of motion, kind of
+    # record.
     assert told.pop("file") == f"about {120 * (8 * 35 + 4 * 4 + 3) / 1000:.1f}kB before compression"
     assert told.pop("modes").startswith("eigenfrequencies 1358, 2364, 3000, 3593, 9122 Hz")
     assert told.pop("orders").startswith("resonances with the mesh: order 1 at 3880, 6755, ")
@@ -134,12 +135,12 @@ def test_a_dry_run_reports_to_a_scheduler_as_json_what_one_shard_takes(tmp_path)
     )
     assert (ended.code, ended.err) == (0, "")
     facts = json.loads(ended.out)
-    # Blocks of 256 lanes: the second one of three.
+    # The shard is the second of three blocks of 256 lanes.
     assert [facts[name] for name in ("output", "exists", "states")] == ["gears.h5", False, 10]
     assert (facts["lanes"], facts["steps"]) == (256, 256 * 40 * 15)
     assert facts["file_bytes"] == 256 * (8 * 35 + 4 * 4 + 3)
     assert facts["seconds"] > 0.0
-    # Not only arrays: nobody starts with less than the interpreter and its packages take.
+    # The memory includes the interpreter and its packages, not only the arrays.
     assert facts["memory_bytes"] > 5e7
 
 
@@ -155,9 +156,9 @@ def test_a_sweep_reports_its_result_as_json(tmp_path):
 
 
 def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):
-    """Each lane of a block has 100 maps of its own, or all have the same ones."""
+    """Each lane of a block has its own 100 maps, or all lanes share 100 maps."""
     told = {}
-    # The first run may compile, which takes memory too.
+    # The first run may compile, which also takes memory.
     for parameter in ("load", "load", "mesh_frequency"):
         flags = ("--set", f'sweep={{parameter="{parameter}", from=0.2, to=0.4, count=256}}')
         for override in ("method=flow_map", "steps_per_period=100"):
@@ -177,11 +178,11 @@ def test_what_a_dry_run_computes_are_lanes_from_all_over_the_sweep():
     second = 'second_sweep={parameter="load", from=0.2, to=0.3, count=30}'
     every = plan_run(load_config(PAN2021, ["start.kind=random", "start.count=9", second]))
     some = some_places(every, 256)
-    # In vectors of 32 neighbours, no end before the other.
+    # The lanes are runs of 32 neighbours, as far from the beginning of the sweep as from its end.
     assert some.size == np.unique(some).size == 256
     assert set(np.diff(some.reshape(-1, 32)).ravel()) == {1}
     assert some[0] == pytest.approx(len(every.lanes) - some[-1], rel=0.01)
-    # Of a carried one those of some neighbouring values, in the middle.
+    # In a carried sweep, the lanes have neighbouring values in the middle.
     some = some_places(plan_run(load_config(PAN2021, ["start.carry=upwards"])), 100)
     assert np.array_equal(some, np.arange(700, 800))
 
@@ -218,7 +219,7 @@ def test_a_dry_run_says_that_the_output_exists_and_leaves_it_alone(tmp_path):
 
 
 def test_lanes_too_fast_for_flow_maps_are_distinguished_from_diverged_ones(tmp_path):
-    # Twice as many steps would be more than are tried.
+    # Twice these steps would exceed the largest number of steps that is tried.
     how = "integration={method='flow_map', steps_per_period=2100, recorded_periods=5}"
     slow = 'sweep={parameter="mesh_frequency", values=[1e-4, 0.8]}'
     ended = sweep(tmp_path, *LINEAR, "--set", how, "--set", slow)
@@ -260,7 +261,7 @@ def test_an_unstable_number_of_steps_is_refused_with_the_limit_and_the_way_out(t
 
 @pytest.mark.parametrize(("share", "code"), [("1.0", 0), ("0.5", 3)])
 def test_as_many_lanes_may_diverge_as_the_configuration_allows(tmp_path, share, code):
-    # Two of these loads drive a lane beyond every length scale.
+    # Two of these loads drive their lanes beyond every length scale.
     values = "sweep={parameter='load', values=[0.3, 1e150, 1e151]}"
     allowed = f"outputs.allowed_diverged_share={share}"
     ended = sweep(tmp_path, "--set", values, "--set", allowed)

@@ -1,4 +1,4 @@
-"""Bad input of the sweep command: one clear message per fault, nothing lost, nothing left over."""
+"""Bad input of the sweep command gives one clear message per fault, and no file is lost or left."""
 
 import os
 import resource
@@ -38,14 +38,14 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_of_the_configuration_is_one_line_and_code_2(tmp_path, fault):
     override, message = FAULTS[fault]
-    section = ("--set", 'outputs.section=["delta_5"]')  # Belongs to every scene.
+    section = ("--set", 'outputs.section=["delta_5"]')  # Valid in every scene.
     ended = sweep(tmp_path, *section, "--set", override)
     assert (ended.code, ended.out) == (2, "")
     line, *causes = ended.err.splitlines()
     assert line.startswith("gearchaos sweep: error: ")
     assert message in line
     assert len(line) < 1300
-    # The only further line names the value that is the probable cause.
+    # A further line may only name the value that is the probable cause.
     assert causes == [] or (len(causes) == 1 and f"{override.split('=')[0]} = " in causes[0])
     assert names_in(tmp_path) == ["gears.toml"]
 
@@ -141,7 +141,7 @@ def test_an_output_that_cannot_be_is_code_4_before_anything_is_computed(tmp_path
     assert names_in(tmp_path / "folder") == []
 
 
-@pytest.mark.skipif(not Path("/sys/kernel").is_dir(), reason="needs a place nobody can write to")
+@pytest.mark.skipif(not Path("/sys/kernel").is_dir(), reason="needs a folder that is not writable")
 def test_a_read_only_place_is_code_4(tmp_path):
     ended = sweep(tmp_path, "--output", "/sys/kernel/gears.h5")
     assert (ended.code, ended.out) == (4, "")
@@ -170,10 +170,10 @@ def test_an_existing_output_is_replaced_where_that_is_asked_for(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of file sizes differ elsewhere")
 def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_path):
-    assert sweep(tmp_path, "--quiet").code == 0  # The kernel is in the cache from now on.
+    assert sweep(tmp_path, "--quiet").code == 0  # From now on, the kernel is in the cache.
     old = (tmp_path / "gears.h5").read_bytes()
     arguments = ["--overwrite", "--set", "pitch_error.mean_um=1.0"]
-    # Room for the block of lanes, which is some 12 kB, but not for the result with its texts.
+    # There is room for the block of lanes, about 12 kB, but not for the result with its texts.
     room = 14_000
     ended = sweep(tmp_path, *arguments, largest_file=room)
     assert (ended.code, ended.out) == (4, "")
@@ -183,7 +183,7 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
     assert names_in(tmp_path) == ["gears.h5", "gears.h5.blocks", "gears.toml"]
     again = sweep(tmp_path, *arguments, "--resume")
     assert again.code == 0
-    assert "lanes/s" not in again.err  # Nothing was left to be computed.
+    assert "lanes/s" not in again.err  # No lanes were left to compute.
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
 
 
@@ -203,7 +203,7 @@ def test_a_disk_that_fills_up_in_the_middle_costs_the_blocks_that_do_not_fit(tmp
 def test_a_disk_that_was_full_from_the_start_leaves_nothing_behind(tmp_path):
     sweep(tmp_path, "--dry-run")
 
-    # Less than what is written on stderr, which is a pipe therefore.
+    # The limit is smaller than the output on stderr: stderr is therefore a pipe.
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 

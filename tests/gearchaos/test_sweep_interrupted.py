@@ -1,4 +1,4 @@
-"""A sweep that is stopped half-way: what is kept, what is said, and how it goes on."""
+"""An interrupted sweep keeps its finished blocks, reports how to continue, and can be resumed."""
 
 import os
 import random
@@ -31,7 +31,7 @@ from .commands import (
 
 HELD_LOCKS = Path("/proc/locks")
 
-# Four blocks of lanes that take a second together.
+# Four blocks of lanes that take a second in total.
 LONG = (
     *("--threads", "1"),
     *LINEAR,
@@ -49,7 +49,7 @@ def undisturbed(tmp_path_factory):
 
 
 def stop_half_way(folder, number, *arguments):
-    """Start the long sweep, send it a signal once a block is finished, and return how it ended."""
+    """Start the long sweep, signal it after its first block, and return exit code and stderr."""
     small_config(folder)
     code, out, err = signalled(folder, BLOCKS, number, "gears.toml", *LONG, *arguments)
     assert "Traceback" not in err
@@ -91,7 +91,7 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
     for path in (tmp_path / BLOCKS).iterdir():
         with pytest.raises(gearchaos.GearchaosError):
             gearchaos.open_result(path)
-    # Neither lost by accident nor mixed with another sweep.
+    # Finished blocks are neither lost by accident nor mixed with another sweep.
     refused = sweep(tmp_path, *LONG)
     assert refused.code == 4
     assert "continue with: " not in refused.err
@@ -103,7 +103,7 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
         in (other.err)
     )
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
-    # A block that was damaged is told and computed again.
+    # A damaged block is reported and computed again.
     block = min((tmp_path / BLOCKS).glob("*.block"))
     block.write_bytes(block.read_bytes()[:-100])
     resumed = sweep(tmp_path, *LONG, "--resume")
@@ -152,7 +152,7 @@ def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
     first, ended = begin("gearchaos.sweep", ("gears.toml", *LONG), tmp_path)
     while is_running(first) and not list((tmp_path / BLOCKS).glob("*.block")):
         time.sleep(0.005)
-    os.kill(first, signal.SIGSTOP)  # It shall not end before.
+    os.kill(first, signal.SIGSTOP)  # The first sweep must not end before the second.
     second = sweep(tmp_path, *LONG, "--resume", beside=True)
     os.kill(first, signal.SIGTERM)
     os.kill(first, signal.SIGCONT)
@@ -163,15 +163,15 @@ def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
 
 
 def is_locked(output):
-    """Tell whether a sweep holds its lock, without asking for it: that would keep the sweep out."""
+    """Return whether a sweep holds its lock, without taking it: that would block the sweep."""
     lock = folder_of(output) / LOCK
     return lock.exists() and f":{lock.stat().st_ino} " in HELD_LOCKS.read_text()
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not HELD_LOCKS.exists(), reason="the system does not tell which locks are held")
+@pytest.mark.skipif(not HELD_LOCKS.exists(), reason="the system does not list held locks")
 def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
-    # Sixty-three blocks, of which every attempt finishes a few; the last ones meet the merging.
+    # There are 63 blocks. Every attempt finishes a few; the last ones are killed while merging.
     wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=32000", "--quiet")
     wide += ("--set", "integration.transient_periods=100")
     (tmp_path / "undisturbed").mkdir()
@@ -187,7 +187,7 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
         enough = min(before + moments.randint(1, 7), 63)
         while is_running(process) and blocks_in(tmp_path) < enough:
             time.sleep(0.001)
-        # The result to be is begun beside the blocks.
+        # The new result is begun next to the blocks.
         while (
             is_running(process) and enough == 63 and not list((tmp_path / BLOCKS).glob(".gears*"))
         ):
@@ -196,7 +196,7 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
         os.kill(process, signal.SIGKILL)
         assert ended().code == -signal.SIGKILL
         finished.append(blocks_in(tmp_path))
-        # What was there before is there still.
+        # Blocks of earlier attempts are kept.
         assert finished[-1] >= before
         assert not output.exists()
     assert len({count for count in finished if 0 < count < 63}) > 5, finished
@@ -225,7 +225,7 @@ def test_damaged_foreign_and_ill_dated_blocks_are_reported_and_computed_again(
     content = bytearray(flipped.read_bytes())
     content[len(content) // 2] ^= 0x10
     flipped.write_bytes(content)
-    # The clock has been set back since.
+    # The blocks are from tomorrow, as if the clock had been set back.
     tomorrow = time.time() + 86_400
     for path in (tmp_path / BLOCKS).iterdir():
         os.utime(path, (tomorrow, tomorrow))
@@ -256,7 +256,7 @@ def test_an_output_folder_that_is_removed_meanwhile_is_code_4(tmp_path):
 
 
 def other_kernels(folder):
-    """Copy the kernels, change a source, and return the environment of who computes with them."""
+    """Copy the kernels, change a source, and return an environment that uses the copy."""
     original = Path(gearchaos_kernels.__file__).parent
     copy = Path(shutil.copytree(original, folder / "other" / original.name))
     with (copy / "rk4.py").open("a") as source:
@@ -277,7 +277,7 @@ def test_neither_blocks_nor_a_result_of_other_kernels_are_gone_on_with(tmp_path)
     ):
         assert (ended.code, ended.out) == (4, "")
         assert re.search(f"{BLOCKS}: holds blocks of {differs}.* delete the folder", ended.err)
-        # Nor is anything compiled for that.
+        # Nothing is compiled before the refusal.
         assert len(ended.err.splitlines()) == 1
         assert names_in(tmp_path / BLOCKS) == before
     assert sweep(tmp_path, *LINEAR, "--resume", "--quiet").code == 0
@@ -310,7 +310,7 @@ def test_the_same_command_is_not_recommended_where_it_must_fail_again(tmp_path):
 def test_resuming_a_complete_sweep_succeeds_and_says_so(tmp_path):
     assert sweep(tmp_path, *LINEAR, "--quiet").code == 0
     before = (tmp_path / "gears.h5").read_bytes()
-    # What a process leaves that is killed while it tidies up.
+    # A process that is killed during its cleanup leaves such blocks.
     assert sweep(tmp_path, *LINEAR, "--shard", "1/1", "--output", "again.h5").code == 0
     (tmp_path / "again.h5.blocks").rename(tmp_path / BLOCKS)
     for arguments in ([], ["--shard", "1/2"]):

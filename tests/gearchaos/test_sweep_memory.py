@@ -1,4 +1,4 @@
-"""The memory of a sweep is that of a block and of the parameters of its lanes."""
+"""A sweep takes memory for a block and for the parameters of its lanes."""
 
 import json
 import subprocess
@@ -8,7 +8,7 @@ import pytest
 
 from .commands import small_config
 
-# Not by getrusage: that begins at the peak of the process which has started this one.
+# getrusage is not used: its peak includes the peak of the parent process.
 PEAK = """
 import sys
 from pathlib import Path
@@ -18,7 +18,7 @@ print(1024 * int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].sp
 sys.exit(code)
 """
 CAPTURED = {"capture_output": True, "text": True, "check": True}
-# 64 section points, but next to nothing to compute.
+# The sweep has 64 section points, but almost nothing to compute.
 WIDE = {
     "scene.effects": ["pitch_error"],
     "pitch_error.phase_deg": 0.0,
@@ -32,7 +32,7 @@ WIDE = {
 
 
 def command(folder, lanes):
-    """Return the sweep command, and let it find its configuration."""
+    """Write the configuration and return the sweep command."""
     settings = {**WIDE, "sweep.count": lanes}
     flags = [w for k, v in settings.items() for w in ("--set", f"{k}={json.dumps(v)}")]
     config = str(small_config(folder))
@@ -46,22 +46,23 @@ def peak(folder, lanes):
 
 
 def estimate(folder, lanes):
-    """Return what the dry run tells of the peak memory."""
+    """Return the peak memory that the dry run estimates, in bytes."""
     done = subprocess.run([*command(folder, lanes), "--dry-run", "--json"], **CAPTURED)
     return json.loads(done.stdout[: done.stdout.rindex("}") + 1])["memory_bytes"]
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems tell the peak elsewhere")
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems report the peak elsewhere")
 def test_more_lanes_take_no_more_memory_than_their_parameters(tmp_path):
     few, many = 20_000, 80_000
-    peak(tmp_path, 100)  # The kernel is in the cache from now on.
+    peak(tmp_path, 100)  # From now on, the kernel is in the cache.
     largest = peak(tmp_path, many)
     growth = largest - peak(tmp_path, few)
     results = (many - few) * 64 * 8
     assert growth < results
     told = estimate(tmp_path, many)
-    # What is told is enough; too much would wait for a node that is not needed.
+    # The estimate is sufficient. With a much larger one, a job would wait for a node that it
+    # does not need.
     assert largest < told < 1.5 * largest
-    # What a million lanes would need at this rate, with the interpreter and its packages.
+    # At this rate, a million lanes need less than 400 MB besides the interpreter and its packages.
     assert growth * 1_000_000 / (many - few) < 400e6

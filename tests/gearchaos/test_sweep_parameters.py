@@ -1,4 +1,4 @@
-"""Any parameter of the model can be the swept one: groups and physical quantities alike."""
+"""Every parameter of the model can be swept, both groups and physical quantities."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from gearchaos.models.gear_pair.tables import SWEEPABLE_KEYS
 
 from .commands import SMALL
 
-# Where the values of the small sweep do not serve.
+# Ranges of parameters for which the values of the small sweep are unsuitable.
 SPANS = {
     "base_helix_angle_deg": (10.0, 20.0),
     "mesh_frequency": (0.4, 0.6),
@@ -40,7 +40,7 @@ SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 30.0"
 SOME_FRICTION = {"[groups]": "[groups]\nfriction_coefficient = 0.1"}
 WITH_FRICTION = {'"transverse", "axial"]': '"transverse", "axial", "friction"]'}
 
-# What the small sweep has to give in another way for a parameter to act, or to act alone.
+# Changes of the small sweep with which a parameter acts, or acts alone.
 CHANGES = {
     "mesh.damping_ratio": {"[groups]\ndamping_ratio = 0.05": ""},
     "mesh.damping_N_s_per_m": {
@@ -109,7 +109,7 @@ def test_with_a_trapezoid_each_lane_has_the_stiffness_of_its_value(name, tmp_pat
     result.save(tmp_path / "swept.h5")
     kept = gearchaos.open_result(tmp_path / "swept.h5").parameters["stiffness_cosine"]
     assert kept.dims == (result.axis, "harmonic") and kept.origin == "swept"
-    # The same pair without a sweep of its geometry: one table of stiffness for all lanes.
+    # The same pair without a sweep of its geometry has one table of stiffness for all lanes.
     fixed = configured(parameter, low, high).at({parameter: high})
     fixed = fixed.replace({"sweep": {"parameter": "pitch_error", "values": [1.0]}})
     shared = gearchaos.run(fixed)

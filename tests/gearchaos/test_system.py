@@ -1,4 +1,4 @@
-"""One system at one point: what a dynamicist asks of it, against exact truths and stored orbits."""
+"""One system at one point: analyses of its dynamics against exact solutions and stored orbits."""
 
 from pathlib import Path
 
@@ -49,7 +49,7 @@ def test_the_states_have_one_order_in_configuration_and_kernels():
 @pytest.mark.parametrize("stored", ORBITS, ids=lambda orbit: f"{orbit['pitch_error']}")
 def test_orbits_and_multipliers_are_the_stored_ones(stored, overrides, multipliers, exponent):
     config = gearchaos.load_config(PAN2021, overrides)
-    # The stored solutions are of rounded ones.
+    # The stored solutions use rounded values of these groups.
     derived = {name: SOLUTIONS["groups"][name] for name in ("mass_ratio_p", "mass_ratio_g")}
     derived["base_helix_angle_deg"] = SOLUTIONS["beta_b_deg"]
     system = gearchaos.System(config, pitch_error=stored["pitch_error"], **derived)
@@ -74,7 +74,7 @@ def test_a_motion_settles_on_the_orbit_that_is_asked_for(doubled):
 def test_an_orbit_is_followed_to_where_its_period_doubles(doubled):
     branch = doubled.follow(doubled.orbit(period=2), "pitch_error", 10.75, 11.6)
     assert branch.loss is StabilityLoss.PERIOD_DOUBLING
-    # docs/numerics.md: 11.4255 with 200 steps.
+    # docs/numerics.md has 11.4255 with 200 steps.
     assert branch.value == pytest.approx(11.4255, abs=2e-4)
     assert branch.value < branch.beyond < branch.value + 2e-4
     assert branch.multiplier.real < -0.99
@@ -112,7 +112,7 @@ def test_along_flow_maps_orbits_exponents_and_their_end_are_those_of_finer_ones_
         system = gearchaos.System(gearchaos.load_config(PAN2021, how), pitch_error=10.75)
         orbit = system.orbit(period=2, guess=guess)
         exponents = system.exponents(start=orbit.point).values
-        # What crossings do to volumes is nothing, and each step is exact.
+        # Crossings do not change volumes, and each step is exact.
         assert exponents.sum() == pytest.approx(system.sum_of_exponents(), abs=1e-12)
         assert orbit.exponent == pytest.approx(
             np.log(np.abs(orbit.multipliers).max()) / (2.0 * system.mesh_period), abs=1e-12
@@ -134,7 +134,7 @@ def test_the_mean_mesh_force_of_an_orbit_carries_the_load(doubled):
     orbit = doubled.orbit(period=2)
     found = doubled.mesh_motion(doubled.integrate(2, start=orbit.point))
     force = np.cos(doubled.groups["base_helix_angle"]) * found.force_tangential[:-1]
-    # Sums over a period of a function with kinks converge like the square of the step.
+    # Sums over a period converge with the square of the step for a function with kinks.
     assert force.mean() == pytest.approx(doubled.groups["load"], rel=1e-3)
     assert set(found.contact_tangential.tolist()) == {0, 1}
     assert found.accelerations.shape == (401, 3)

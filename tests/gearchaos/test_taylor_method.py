@@ -28,7 +28,7 @@ def config(method, *overrides):
 
 @pytest.fixture(scope="module")
 def by_series(tmp_path_factory):
-    """The result of the two masses by Taylor series, from the command line."""
+    """Return the result of the two masses by Taylor series, computed on the command line."""
     folder = tmp_path_factory.mktemp("series")
     overrides = [f"--set={one}" for one in ("integration.method='taylor'", *SHORT)]
     ended = run_module("gearchaos.sweep", str(MASSES), "-o", "out.h5", *overrides, cwd=folder)
@@ -120,7 +120,7 @@ def test_a_spectrum_is_sampled_finely_enough_by_default():
 
 
 def test_an_element_that_weakens_another_one_does_not_hide_a_fast_motion():
-    # Alone the first element is ten times stiffer than with the second, which takes back its force.
+    # Alone, the first element is much stiffer than with the second, which cancels its stiffness.
     stop = {"gap": {"x": 1.0}, "stiffness": 1000.0, "one_sided": True}
     limited = {"reaction": {"x": -1.0}, "half_clearance": 0.9}
     machine = {

@@ -108,7 +108,7 @@ def test_the_error_in_a_response_is_that_of_the_teeth_in_mesh():
     error = response["mesh_error"][0]
     steps = response.metadata["steps_per_period"]
     assert error[: 21 * steps] == pytest.approx(error[21 * steps : 42 * steps], abs=1e-15)
-    # Along the line of action, of a driving tooth that lies ahead less remains.
+    # A driving tooth that lies ahead has a negative error along the line of action.
     alpha_t = np.arctan(np.tan(np.radians(20.0)) / np.cos(np.radians(20.0)))
     deviations = DEVIATIONS - DEVIATIONS[0]
     assert -error.max() * 50.0 > deviations.min() * np.cos(alpha_t)
@@ -131,7 +131,7 @@ def test_rigid_slow_teeth_transmit_what_an_eccentric_pinion_does(helix_angle):
     pair = {**TABLES["pair"], "teeth": [teeth, 38], "helix_angle_deg": helix_angle}
     around = 2.0 * np.pi * np.arange(teeth) / teeth
     deviations = (0.5 * range_um * np.sin(around)).tolist()
-    # The load bends the teeth by a thousandth of the range, as the stiffness varies by less.
+    # The load bends the teeth by a thousandth of the range; varying stiffness changes this by less.
     rigid = {"mesh_frequency": 0.1, "load": 0.001 * range_um / 50.0, "damping_ratio": 0.3}
     config = configured(
         pair=pair,
@@ -143,7 +143,7 @@ def test_rigid_slow_teeth_transmit_what_an_eccentric_pinion_does(helix_angle):
     )
     response = gearchaos.System(config).response(periods=teeth)
     error_um = 50.0 * (response["delta_5"] + response["mesh_error"])[0]
-    # Along the line of action, which in the transverse plane has the angle alpha_t.
+    # The line of action has the angle alpha_t in the transverse plane.
     alpha_t = np.arctan(np.tan(np.radians(20.0)) / np.cos(np.radians(helix_angle)))
     assert np.ptp(error_um) == pytest.approx(range_um * np.cos(alpha_t), rel=0.01)
 
@@ -155,7 +155,7 @@ def noted(**changes) -> str:
 
 
 def with_errors(deviations, load: float) -> dict:
-    """Return the tables of a pinion with these deviations of its first teeth, and of a load."""
+    """Return the tables of a load and of a pinion whose first teeth have these deviations."""
     listed = [*deviations, *[0.0] * (21 - len(deviations))]
     return {
         "pitch_error": {"kind": "teeth", "driving": {"cumulative_um": listed}},
@@ -164,7 +164,7 @@ def with_errors(deviations, load: float) -> dict:
 
 
 def test_pairs_that_share_the_load_part_where_they_differ_by_more_than_it_bends_them():
-    # Three pairs share at once; neighbours differ by 10 um, the first and the third by 20.
+    # Three pairs share the load at once: neighbours differ by 10 um, the first and third by 20 um.
     slope = with_errors([0.0, 10.0, 20.0, 10.0], load=0.3)
     along, cosine = np.cos(np.radians(21.1728)) / 50.0, np.cos(np.radians(18.7472))
     told = "of the lanes tooth pairs that share the load differ by up to"
@@ -172,7 +172,8 @@ def test_pairs_that_share_the_load_part_where_they_differ_by_more_than_it_bends_
         slope["groups"] = {**slope["groups"], "load": times * along * cosine}
         said = noted(**slope)
         assert (told in said) == parts
-        # The pair has a length scale of 50 um, and so has its first and third tooth 20 um apart.
+        # The length scale is 50 um; 20 um between the first and third tooth are 18.6 um along the
+        # line of action.
         assert ("by up to 18.6 um, more than the static deflection there (18.6 um" in said) == parts
         assert ("raise operation.torque_Nm or groups.load" in said) == parts
 

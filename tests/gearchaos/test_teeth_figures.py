@@ -1,4 +1,4 @@
-"""The page of a response of teeth with errors of their own, of known waves over known orders."""
+"""The page of a response of teeth with individual errors shows known waves at known orders."""
 
 from functools import cache
 from pathlib import Path
@@ -39,9 +39,10 @@ def known_teeth(
     scaled: bool = True,
     **facts: float | str,
 ) -> Result:
-    """Make a response with lines of mesh, both shafts and another order, of so many excitations.
+    """Return a response with lines of the mesh, of both shafts and of another order.
 
-    Amplitudes are 1 of the mesh, 0.3 of the driving and 0.2 of the driven shaft, 0.1 of the other.
+    It has ``recorded`` periods of the excitation. The amplitudes are 1 for the mesh, 0.3 for the
+    driving shaft, 0.2 for the driven shaft and 0.1 for the other order.
     """
     time = np.arange(-recorded * MEET * STEPS, 0 + 1) / STEPS
     lines = {1.0: 1.0, 3.0 / DRIVING: 0.3, 1.0 / DRIVEN: 0.2}
@@ -125,7 +126,7 @@ def test_motions_repeat_after_whole_excitations_if_there_are_three_of_them(
 
 @cache
 def known_page() -> Page:
-    """Return the page of the known teeth, which nobody changes."""
+    """Return the page of the known teeth; tests must not change it."""
     return response_page(known_teeth(), 0)
 
 
@@ -193,7 +194,7 @@ def test_the_section_says_after_what_the_motion_repeats(made, words):
 
 
 def coloured(axes) -> dict[str, set[float]]:
-    """Return the shaft orders of the lines that are seen, by colour."""
+    """Return the shaft orders of the visible lines, by colour."""
     (lines,) = axes.collections
     found: dict[str, set[float]] = {}
     for segment, colour in zip(lines.get_segments(), lines.get_colors(), strict=True):
@@ -260,7 +261,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_a_gear_without_errors_has_no_lines_of_its_own():
-    """Half of the mesh order is a multiple of the other shaft, but there for another reason."""
+    """Half of the mesh order is a multiple of the other shaft order, but has another cause."""
     result = known_teeth(recorded=8, extra_order=0.5, excitation_period=DRIVING)
     *_, spectrum = response_page(result, 0).axes
     assert BLUE not in coloured(spectrum)

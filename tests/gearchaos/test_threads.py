@@ -1,4 +1,4 @@
-"""Several threads or processes at once find what one finds, or what to do instead is said."""
+"""Several threads or processes give the results of one, or a message with the remedy."""
 
 import json
 import os
@@ -34,7 +34,7 @@ THREADS = (4, 8)
 
 @pytest.fixture(autouse=True)
 def _quick_switches() -> Iterator[None]:
-    """Let threads change places as often as they can."""
+    """Let the interpreter switch threads as often as possible."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-5)
     yield
@@ -53,14 +53,14 @@ def test_results_of_threads_are_those_of_one_bit_for_bit(threads, monkeypatch):
         forget_maps(monkeypatch)
         serial.append(gearchaos.run(config))
     forget_maps(monkeypatch)
-    # The second time with the maps that the first one has left.
+    # The second pass uses the maps that the first pass has stored.
     for _ in range(2):
         with ThreadPoolExecutor(threads) as pool:
             assert all(map(same_data, pool.map(gearchaos.run, configs), serial))
 
 
 def in_a_process(layer: str, *ways: str) -> dict:
-    """Return what the script of `tiny_sweep` finds in a process of its own."""
+    """Return the findings of the script `tiny_sweep` in a new process."""
     script = Path(__file__).with_name("tiny_sweep.py")
     variables = {"NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}
     done = subprocess.run(
@@ -71,15 +71,15 @@ def in_a_process(layer: str, *ways: str) -> dict:
         timeout=300,
     )
     if "threading layer could be loaded" in done.stderr:
-        pytest.skip(f"no threading layer {layer} here")
+        pytest.skip(f"the threading layer {layer} is not available")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes are forked here")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="os.fork is not available")
 class TestProcesses:
     def test_threads_and_forks_work_without_openmp(self):
-        # Numba ends a process of which two threads enter this layer at once.
+        # Numba ends a process if two of its threads enter this layer at once.
         found = in_a_process("workqueue", "fork")
         assert found == {"forked in a turn": True, "threads": True, "fork": True}
 
@@ -110,7 +110,7 @@ class TestProcesses:
 
 
 def pictures() -> list[Callable]:
-    """List what draws pages, each another one."""
+    """Return functions that draw different pages."""
     sweeps = [logistic_sweep(np.linspace(low, 3.9, 21)) for low in (2.8, 3.2, 3.5)]
     pages = [lambda one=one: bifurcation_page(one, width_mm=60.0) for one in sweeps]
     return [*pages, lambda: map_page(MAP, "lyapunov_exponent"), lambda: map_page(MAP, "motion")]
@@ -165,7 +165,7 @@ def test_only_one_place_changes_the_settings_of_matplotlib():
 
 @pytest.fixture
 def heard():
-    """Ctrl-C is heard: a shell lets processes in the background ignore it."""
+    """Let Ctrl-C have an effect: in a shell, background processes ignore it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -185,9 +185,11 @@ def test_a_signal_is_for_the_main_thread_and_other_threads_leave_it_alone():
         with heeded(at_once=False):
             noting = {number: signal.getsignal(number) for number in handlers}
             assert pool.submit(elsewhere).result() == noting
-            # To this thread: another one, waiting for a core, could receive it later.
+            # The signal is raised in this thread: another thread that waits for a core could
+            # receive it later.
             signal.raise_signal(signal.SIGINT)
-            # Its end must neither forget the signal nor put the handlers back.
+            # The end of the block in the other thread must not discard the signal or restore the
+            # handlers.
             after = pool.submit(elsewhere).result()
             assert after[signal.SIGTERM] == noting[signal.SIGTERM]
             with pytest.raises(KeyboardInterrupt):

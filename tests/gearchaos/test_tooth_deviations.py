@@ -25,7 +25,7 @@ ERROR = '[pitch_error]\nkind = "teeth"\n'
 F = [0.0, 4.0, 1.0, -2.0, -1.0]
 """Cumulative deviations of a gear with five teeth."""
 SINGLE = [1.0, 4.0, -3.0, -3.0, 1.0]
-"""The single ones of the same gear."""
+"""Single deviations of the same gear."""
 
 
 def text_of(error, teeth="[5, 38]"):
@@ -46,8 +46,8 @@ def gear_of(text):
     return deviations_of(Configuration.from_toml(text)).driving[0].tolist()
 
 
-# A gear turns; seen from the mesh, the tooth that follows lies behind. Counted with the rotation it
-# has a lower number.
+# A gear turns: seen from the mesh, the next tooth lies behind. Counted with the rotation, the next
+# tooth has a lower number.
 def test_teeth_counted_with_the_rotation_come_into_mesh_with_falling_numbers():
     assert gear_of(driving(f"cumulative_um = {F}")) == [0.0, -1.0, -2.0, 1.0, 4.0]
 
@@ -58,7 +58,8 @@ def test_counted_against_it_they_rise_and_farther_on_is_behind():
 
 
 def test_one_gear_counted_both_ways_is_one_gear():
-    # Tooth 0 stays, every other has another number; what was ahead is behind in the counting.
+    # Tooth 0 keeps its number, every other tooth gets another one; in this count, teeth that were
+    # ahead are behind.
     other_way = [0.0, *(-one for one in F[:0:-1])]
     keys = (f"cumulative_um = {other_way}", 'counted = "against_rotation"')
     assert gear_of(driving(*keys)) == gear_of(driving(f"cumulative_um = {F}"))
@@ -112,7 +113,7 @@ def test_lanes_have_the_gears_of_their_grade_and_number():
     values = lanes.values_of(some)
     assert values["pitch_error.grade"].tolist() == [7.0, 5.0, 7.0]
     found = tooth_deviations(config.pitch_error, config.pair, values)
-    assert found.profile.tolist() == [1, 0, 1]  # made once each, and no others
+    assert found.profile.tolist() == [1, 0, 1]  # each profile is made once, and no others
     for gear, (teeth, profiles) in enumerate(((21, found.driving), (38, found.driven))):
         sizes = (2.166, teeth * 2.166 / np.cos(np.radians(20.0)))
         for grade, profile in zip((5, 7), profiles, strict=True):
@@ -187,7 +188,7 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
     assert "sweep.count = 2 (set for this run)" in shown.out
     onwards = ("gears.h5", "--at", "5.0", "--periods", "2")
     assert run_module("gearchaos.response", *onwards, cwd=tmp_path).code == 0
-    # Who reads the configuration anew needs the file.
+    # To read the configuration again, the file is necessary.
     ended = run_module("gearchaos.sweep", *arguments, "--overwrite", cwd=tmp_path)
     assert ended.code == 2
     assert 'pitch_error.driving.file = "gear.csv": cannot be read: No such file' in ended.err
@@ -260,7 +261,7 @@ def test_no_message_quotes_a_file_that_a_configuration_names(tmp_path):
 
 
 def stored_elsewhere(folder, text):
-    """Write a result whose stored configuration is another one."""
+    """Write a result whose stored configuration is this text."""
     good_result(folder / "good.h5")
     (folder / "stored.h5").write_bytes((folder / "good.h5").read_bytes()[:-CHECKSUM_LINE])
     with h5py.File(folder / "stored.h5", "r+") as file:
@@ -279,7 +280,7 @@ def stored_elsewhere(folder, text):
     ],
 )
 def test_a_stored_configuration_opens_no_other_file(arguments, tmp_path):
-    # It would do: whoever opened it would go on.
+    # The file is valid: a command that opened it would continue.
     (tmp_path / "secret").write_text(SECRET)
     stored_elsewhere(tmp_path, driving('file = "secret"', 'column = "Fp"'))
     module, *rest = arguments
@@ -322,7 +323,7 @@ def test_a_text_reads_files_of_the_folder_that_it_is_given(tmp_path):
     ],
 )
 def test_a_missing_file_is_refused_with_its_key(name, message, tmp_path):
-    # Whoever waits for its writer waits for ever.
+    # The pipe has no writer: a command that waited for one would never end.
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "gears.toml").write_text(driving(f'file = "{name}"', 'column = "Fp"'))
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)
@@ -472,7 +473,7 @@ Fp;21,5;20,1
 
 
 def sheet(order, begin: int, mark: str = ";") -> str:
-    """Write an inspection sheet with the teeth in an order, and numbers that begin with 0 or 1."""
+    """Return an inspection sheet with the teeth in this order; their numbers begin at 0 or 1."""
     rows = (f"{k + begin};{F[k]:.1f};{-F[k]:.1f}".replace(".", ",") for k in order)
     return SHEET.format(rows="\n".join(rows)).replace(";", mark)
 
@@ -480,7 +481,7 @@ def sheet(order, begin: int, mark: str = ";") -> str:
 @pytest.mark.parametrize("mark", [";", "\t"])
 @pytest.mark.parametrize("begin", [0, 1])
 def test_an_inspection_sheet_is_read_as_it_comes(begin, mark, tmp_path):
-    # Rows in another order are put in the order of the tooth numbers.
+    # Rows in another order are sorted by tooth number.
     text = sheet([2, 0, 4, 1, 3], begin, mark)
     (tmp_path / "sheet.csv").write_text(text, encoding="utf-8")
     path = tmp_path / "gears.toml"
@@ -488,7 +489,7 @@ def test_an_inspection_sheet_is_read_as_it_comes(begin, mark, tmp_path):
         path.write_text(driving('file = "sheet.csv"', f'column = "{column}"'))
         found = load_config(path).pitch_error.driving.cumulative_um
         assert found == pytest.approx([sign * round(f, 1) for f in F])
-    # A column of tooth numbers with any heading is named.
+    # A column of tooth numbers may have any heading if the configuration names it.
     (tmp_path / "sheet.csv").write_text(text.replace("Zahn-Nr.", "dent"), encoding="utf-8")
     keys = ('file = "sheet.csv"', 'column = "Fp rechts"', 'tooth_column = "dent"')
     path.write_text(driving(*keys))

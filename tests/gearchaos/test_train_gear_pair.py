@@ -1,4 +1,4 @@
-"""A gear pair with bearings, described as a train, moves as the model of the gear pair does."""
+"""A gear pair with bearings has the same motion as a train and as the model of the gear pair."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ TEETH = (24, 36)
 def train(error):
     """Return the train: the driving shaft turns uniformly, and both shafts move sideways."""
     mobility = RADII[1] ** 2 / (1e6 * INERTIA) + sum(1.0 / mass for mass in MASSES)
-    # The damping of the mesh is 2 * 0.04 sqrt(k m_e), with m_e of the rotation alone.
+    # The damping of the mesh is 2 * 0.04 sqrt(k m_e), with the m_e of the rotation alone.
     ratio = 0.04 * np.sqrt(mobility * 1e6 * INERTIA / RADII[1] ** 2)
     shafts = [{"mass_kg": m, "bearing_N_per_um": k} for m, k in zip(MASSES, BEARINGS, strict=True)]
     shafts[0] |= {"inertia_kg_m2": 1.0, "uniform": True}
@@ -49,7 +49,7 @@ def train(error):
 
 
 def pair(error):
-    """Return the gear pair; its driving gear is too heavy to leave its uniform rotation."""
+    """Return the gear pair; its driving gear is so heavy that its rotation stays uniform."""
     number, normal = np.arange(1, HARMONICS + 1), 20.0
     module = 2.0 * RADII[0] / TEETH[0] / np.cos(np.radians(normal))
     dampers = [2e3 * 0.02 * np.sqrt(k * m) for k, m in zip(BEARINGS, MASSES, strict=True)]
@@ -85,14 +85,14 @@ def pair(error):
 
 
 def motions(error, steps):
-    """Return the outcomes of both, the train in the units of the pair, from the same start."""
+    """Return sections and contact of pair and train from the same start, in units of the pair."""
     values = {"operation.speed_rpm": SPEEDS}
     configs = pair(error), train(error)
     gears, shafts = (system_of(config, values) for config in configs)
     start, of_train = (np.zeros((SPEEDS.size, len(one.states))) for one in (gears, shafts))
     start[:, 0] = 3.0
-    # delta_5 = (r_p theta_p - r_g theta_g - e) over half a backlash. At the start e = 0, and its
-    # rate is that of the gears.
+    # delta_5 = (r_p theta_p - r_g theta_g - e) over half a backlash. At the start e = 0, and the
+    # rate of e is the rate of the gears.
     angle = shafts.states.index("output_angle")
     of_train[:, angle] = -3.0 * BACKLASH / RADII[1]
     of_train[:, angle + 1] = -shafts.frequency * error / RADII[1]
@@ -114,8 +114,8 @@ def test_a_gear_pair_with_bearings_moves_as_the_train_of_two_shafts():
 
 
 def test_with_an_error_of_the_gears_both_converge_to_the_same_motion():
-    # The pair has the error as an inertia force, the train as a motion of its flanks, so that the
-    # errors of the steps differ.
+    # In the pair, the error is an inertia force; in the train, it is a motion of the flanks. The
+    # errors of the steps therefore differ.
     apart = [
         np.abs(np.subtract(*motions(error=3.0, steps=steps)[:2])).max(axis=(1, 2))
         for steps in (200, 800)

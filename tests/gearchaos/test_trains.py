@@ -36,7 +36,7 @@ def test_natural_frequencies_of_a_planetary_set(planets):
     given = configured("planetary", {}).planetary.model_copy(update={"planets": planets})
     machine = planetary.assembled(given, ("translation",), free=True).machine(1.0)
     squares = eigh(machine.held, machine.mass, eigvals_only=True)
-    # Angular frequencies are per ms.
+    # Angular frequencies are in rad/ms.
     found = np.sort(np.sqrt(np.abs(squares)) * 1e3 / (2.0 * np.pi))
     expected = np.sort(
         [*exact["rotational"], *(2 * exact["translational"]), *(2 * exact.get("planet", []))]
@@ -57,7 +57,7 @@ def test_the_torque_is_shared_by_the_planets_at_rest():
 
 
 def test_a_symmetric_set_stays_symmetric():
-    # 27 and 99 teeth are multiples of 3, so that all planets mesh alike.
+    # 27 and 99 teeth are multiples of 3: all planets mesh in phase.
     speeds = {"parameter": "operation.speed_rpm", "values": [1400.0, 2500.0, 3500.0]}
     result = gearchaos.run(configured("planetary", {"sweep": speeds, **SHORT}))
     state = dict(zip(result.variables["state"].flags, result["end_state"].T, strict=True))
@@ -70,7 +70,7 @@ def test_a_symmetric_set_stays_symmetric():
 
 
 def test_flow_maps_of_a_planetary_set_agree_with_fine_steps():
-    # Backlash in six meshes: maps are made for the sets of branches that a motion enters.
+    # With backlash in six meshes, maps are made only for the sets of branches that a motion enters.
     speeds = {"parameter": "operation.speed_rpm", "values": [5000.0, 6000.0]}
     system = Lanes(configured("planetary", {"sweep": speeds})).system_of(np.arange(2))
     start = system.contact_state()
@@ -86,9 +86,9 @@ def test_flow_maps_of_a_planetary_set_agree_with_fine_steps():
 
 
 def relabelled(names, planets):
-    """Return the map of coordinates onto those of a set whose planets are numbered on by one.
+    """Return the map of coordinates to those of a set whose planet numbers are shifted by one.
 
-    Planet 1 of the new set is planet 2 of the old one, so that its axes are turned by one planet.
+    Planet 1 of the new set is planet 2 of the old one. The axes therefore turn by one planet.
     """
     turn = 2.0 * np.pi / planets
     matrix = np.zeros((len(names), len(names)))
@@ -126,9 +126,9 @@ def test_numbering_the_planets_from_another_one_changes_their_names_only(teeth):
         names.index(f"{one.split('_')[0]}_planet_{int(one[-1]) % table.planets + 1}")
         for one in names
     ]
-    # A gap in the new numbers is the gap of the next planet in the old ones.
+    # A gap in the new numbering is the gap of the next planet in the old numbering.
     assert machine.gap @ matrix == pytest.approx(machine.gap[order], abs=1e-14)
-    # The next planet meshes later by the same share of a period, which is a shift of the time.
+    # The next planet meshes later by the same share of a period, which is a shift in time.
     shift = 2.0 * np.pi * (sun % table.planets) / table.planets
     turned = np.exp(-1j * shift * np.array(kinds.orders))
     for name in ("contact_stiffness", "motion"):
@@ -145,7 +145,7 @@ def test_the_motion_of_a_set_that_is_numbered_on_is_the_same_motion():
     )
     names = list(config.kinds_of_elements.coordinates)
     matrix = relabelled(names, 3)
-    # One planet is pushed out of its place, so that the motion begins without symmetry.
+    # One planet and the sun are displaced, so that the motion begins without symmetry.
     displaced = np.zeros(len(names))
     displaced[[names.index("planet_1_u"), names.index("sun_x")]] = 4.0, 2.0
     results = [
@@ -204,7 +204,7 @@ def test_meshes_follow_each_other_as_the_teeth_pass_the_planets(drive, torque):
     for number in range(3):
         for gear, phase in zip(("sun", "ring"), planetary.mesh_phases(given, number), strict=True):
             passing = teeth[gear] * (turns[gear] - turns["carrier"])
-            # The teeth that pass on the way from planet 1, and how long they take.
+            # Mesh periods in which the teeth between planet 1 and this planet pass.
             later = teeth[gear] * number / 3 / passing * abs(passing)
             first = planetary.mesh_phases(given, 0)[("sun", "ring").index(gear)]
             behind = (first - phase - later) % 1.0
@@ -218,7 +218,7 @@ def test_the_force_of_a_loaded_mesh_pushes_the_gears_apart(drive, torque):
     across = planetary.mesh_rows(given, 0)
     for gear, outward in (("sun", -1.0), ("ring", 1.0)):
         row = across[f"{gear}_planet_1"]
-        # The mesh holds the torque on its gear back.
+        # The mesh force balances the torque on its gear.
         force = -np.sign(planetary.torques(given)[gear]) * row[f"{gear}_x"]
         assert outward * force == pytest.approx(np.sin(np.radians(24.6)))
         assert force + np.sign(planetary.torques(given)[gear]) * -row["planet_1_radial"] < 1e-12
@@ -230,13 +230,13 @@ def test_a_set_that_turns_the_other_way_moves_as_its_mirror_image():
         config = configured("planetary", {**SHORT, "planetary.torque_Nm": torque})
         teeth = {"sun_teeth": 28, "planet_teeth": 35, "ring_teeth": 98}
         changed = {f"planetary.{name}": value for name, value in teeth.items()}
-        # An error of the flanks has its sign, and no mirror image.
+        # An error of the flanks has a sign, and therefore no mirror image.
         changed["scene.effects"] = ["translation", "stiffness_variation", "backlash"]
         changed["sweep"] = {"parameter": "operation.speed_rpm", "values": [1000.0, 2000.0, 2600.0]}
         config = config.replace(changed)
         ways.append(gearchaos.run(config))
     for gear in ("sun", "ring"):
-        # Planets 2 and 3 of one set are 3 and 2 of the other.
+        # Planets 2 and 3 of one set are planets 3 and 2 of the other set.
         for one, other in ((1, 1), (2, 3), (3, 2)):
             names = f"force_rms_{gear}_planet_{one}", f"force_rms_{gear}_planet_{other}"
             assert ways[1][names[1]] == pytest.approx(ways[0][names[0]], rel=1e-8)
@@ -244,7 +244,7 @@ def test_a_set_that_turns_the_other_way_moves_as_its_mirror_image():
 
 def test_mesh_frequency_follows_from_the_teeth():
     given = configured("planetary", {}).planetary
-    # Ring fixed: f_m = n_s z_s z_r / (z_s + z_r).
+    # With a fixed ring: f_m = n_s z_s z_r / (z_s + z_r).
     assert planetary.mesh_rate(given) == pytest.approx(27 * 99 / 126)
     held = given.model_copy(update={"fixed": "carrier", "loaded": "ring"})
     assert planetary.mesh_rate(held) == pytest.approx(27)
@@ -267,7 +267,7 @@ def test_meshes_of_different_frequency_repeat_after_their_common_period():
     assert common_orders([Fraction(24), Fraction(24 * 23, 48)]) == (48, 23)
     config = configured("two_stage", {})
     assert config.orders() == {"first": 2, "second": 1}
-    # 24 teeth at 3000 rpm are 1200 Hz; the common period is that of the second mesh.
+    # 24 teeth mesh at 1200 Hz at 3000 rpm; the common period is the period of the second mesh.
     frequency = config.machine({}).frequency
     assert frequency == pytest.approx(2.0 * np.pi * 0.6)
 

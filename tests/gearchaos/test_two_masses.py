@@ -1,6 +1,6 @@
-"""Two masses and a stop, as a machine of its own: bifurcations against an independent computation.
+"""Bifurcations of two masses and a stop agree with an independent computation.
 
-The stored values come from event-located matrix exponentials, with shooting and arclength.
+The stored values come from event-located matrix exponentials, shooting and arclength continuation.
 """
 
 import json
@@ -19,7 +19,7 @@ CONFIG = Path(__file__).parents[2] / "sweeps" / "two_masses.toml"
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
 POINTS = EXACT["two_masses"]
 STEPS = 1600
-"""Steps per period; the errors of the points below are those of RK4 with so many steps."""
+"""Steps per period; the errors of the points below are those of RK4 with these steps."""
 
 
 def system(frequency, state=None):
@@ -86,7 +86,7 @@ def test_what_it_prints_and_draws_has_no_words_of_gears(tmp_path):
     written = [path.read_text(encoding="utf-8") for path in tmp_path.glob("*.svg")]
     assert len(written) == 2
     for text in (*(one.out + one.err for one in said), *written):
-        # The name of the variable mesh_period is that of the format.
+        # The name of the variable mesh_period belongs to the file format.
         assert not re.findall(r"mesh (?:period|freq)|flank|\bgears?\b|omega_h|scaling freq", text)
     every = "".join(one.out + one.err for one in said)
     assert "(stop, upper side)" in every and '"time in excitation periods"' in every

@@ -1,4 +1,4 @@
-"""A sweep of two parameters with several starts, from the command line to all who read its file."""
+"""A sweep of two parameters with several starts: the command, and all readers of its file."""
 
 import json
 import signal
@@ -16,7 +16,7 @@ LOADS = np.linspace(0.1, 0.5, 5)
 ERRORS = np.linspace(0.0, 5.0, 40)
 STARTS = 3
 SETTLED = "transient_periods = 150\nrecorded_periods = 40"
-# Three blocks of lanes, cut across both axes, that take a second or two together.
+# Three blocks of lanes, cut across both axes, that take a second or two in total.
 BOTH = SMALL.replace(
     "[integration]",
     f"""\
@@ -185,7 +185,7 @@ def test_lanes_of_random_starts_are_not_refined(path):
 
 
 def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path):
-    # With well damped bearings, the lighter load doubles its period within these pitch errors.
+    # With well damped bearings, the motion at the lighter load doubles its period in this range.
     text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
     (tmp_path / "both.toml").write_text(text, encoding="utf-8")
     overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
@@ -212,8 +212,8 @@ def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path)
     ]
     light, heavy, alone = refined
     assert light == alone
-    # The multiplier of period 1 passes -1 at 10.6085; just beyond, a motion leaves it too slowly to
-    # be told by so short a record.
+    # The multiplier of period 1 passes -1 at 10.6085. Just above, the motion leaves period 1 too
+    # slowly for a label from such a short record.
     assert [edge["label_above"] for edge in light["boundaries"]] == ["unresolved", "period 1"]
     assert light["boundaries"][0]["below"] == pytest.approx(10.6085, abs=0.01)
     assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in light["boundaries"])
@@ -238,7 +238,7 @@ def test_a_row_of_a_map_is_the_sweep_of_that_row_bit_for_bit(tmp_path):
 
 
 def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show(tmp_path):
-    """What bisection of a row meets on its way is found too; the lanes that this takes are told."""
+    """Bisection also finds boundaries that it meets on its way, and reports the number of lanes."""
     text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
     (tmp_path / "both.toml").write_text(text, encoding="utf-8")
     overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
@@ -259,7 +259,7 @@ def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show
     for load in loads:
         sliced = json.loads(of_the_file("stages", path, "--at", f"{load}", *width, "--json"))
         ends = [[one[key] for key in edges] for one in sliced["boundaries"]]
-        # Where bisection of a slice meets a third motion, it has one boundary; here begin two.
+        # If bisection meets a third motion, a slice has one boundary; here two boundaries begin.
         rest = [[*one[:3]] for one in found.get(load, [])]
         assert all([*one[:3]] in rest for one in ends)
         for one, other in pairwise(found.get(load, [])):
@@ -268,7 +268,7 @@ def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show
     count = sum(map(len, found.values()))
     assert count > alone > 1
     assert all(0.0 < one[1] - one[0] <= 0.1 for row in found.values() for one in row)
-    # Four halvings of 1.25 are no wider than 0.1, and each takes one lane.
+    # Four halvings of 1.25 give less than 0.1; each halving takes one lane.
     assert 4 * alone < whole["lanes"] < 3 * 51 == whole["lanes_of_a_map_as_fine"]
     told = of_the_file("stages", path, *width)
     assert len(told.splitlines()) == count + len(found) + 1

@@ -1,4 +1,4 @@
-"""Every unit of a key, a group or a result is one that other programs know, in the same sense."""
+"""Other programs know every unit of a key, a group or a result, with the same meaning."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Wilson's interval of a share, against its definition, its closed forms and what it promises."""
+"""Wilson's interval of a share agrees with its definition, its closed forms and its coverage."""
 
 from math import comb
 
@@ -11,7 +11,8 @@ from gearchaos.records.wilson import CONFIDENCE_95, wilson_interval
 @pytest.mark.parametrize(
     ("counted", "of", "interval"),
     [
-        # At the ends z^2 / (n + z^2) and its complement, at a half 1/2 +- z / 2 sqrt(n + z^2).
+        # Count 0 has the upper end z^2 / (n + z^2), count n the lower end 1 - z^2 / (n + z^2),
+        # count n / 2 the ends 1/2 +- z / (2 sqrt(n + z^2)).
         (0, 10, (0.0, 0.2775327998628892)),
         (200, 200, (0.9811546736227335, 1.0)),
         (5, 10, (0.236593090512564, 0.763406909487436)),
@@ -32,7 +33,7 @@ def test_at_its_ends_the_count_lies_so_many_of_their_deviations_away():
 
 @pytest.mark.parametrize("of", [20, 100, 200])
 def test_it_holds_the_share_in_95_of_100_cases(of):
-    """Summed over all counts and averaged over shares: no random numbers."""
+    """The coverage is summed over all counts and averaged over shares, without random numbers."""
     shares, counts = np.linspace(0.02, 0.98, 481), np.arange(of + 1)
     ways = np.array([comb(of, int(n)) for n in counts], dtype=np.float64)
     chance = ways * shares[:, np.newaxis] ** counts * (1.0 - shares[:, np.newaxis]) ** (of - counts)

@@ -1,4 +1,4 @@
-"""Every wrong argument of the public functions is a GearchaosError with a sentence."""
+"""Every wrong argument of the public functions raises a GearchaosError with a sentence."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ NOT_A_NUMBER = ("x", None, [1.0], np.nan, np.inf, 10**400, {})
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
     settled = ("sweep.count=3", "integration.transient_periods=300")
-    # Of the scenes with two states the one that other tests have compiled.
+    # Other tests have already compiled this scene with two states.
     scene = "scene.effects=['pitch_error', 'stiffness_variation', 'backlash']"
     overrides = (*LINEAR[1::2], *settled, scene)
     return gearchaos.load_config(small_config(tmp_path_factory.mktemp("wrong")), overrides)
@@ -35,7 +35,7 @@ def result(config):
 
 
 def refused(function, *arguments, **named):
-    """See that a call is refused in one sentence or several, each with what is wrong."""
+    """Check that a call is refused in sentences that say what is wrong."""
     with pytest.raises(GearchaosError) as caught:
         function(*arguments, **named)
     for sentence in caught.value.problems:

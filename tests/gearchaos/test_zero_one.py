@@ -16,7 +16,7 @@ from .listed_variables import sweep_variables
 
 POINTS = 500
 RATES = {2.5: 1, 3.2: 2, 3.5: 4, 3.83: 3, 3.97: 0, 4.0: 0}
-"""Rates of the logistic map, and the period of its motion, 0 for chaos."""
+"""Rates of the logistic map, with the period of the motion, 0 for chaos."""
 
 
 def logistic(rate: float, points: int = POINTS) -> np.ndarray:
@@ -45,7 +45,7 @@ def test_short_and_incomplete_series_have_no_value():
 
 
 def between(points, repeats):
-    """Return points with others between them, (points * repeats,)."""
+    """Return points with other points between them, (points * repeats,)."""
     shifts = np.arange(1.0 - repeats, 1.0)
     return (points[:, np.newaxis] + shifts).ravel()
 
@@ -53,7 +53,7 @@ def between(points, repeats):
 def saved(folder, points: int = POINTS, repeats: int = 1):
     """Save a sweep of the logistic map whose lane at rate 3.5 is labelled chaotic.
 
-    ``repeats``: section points of each period of the excitation, which differ.
+    ``repeats``: number of different section points in each period of the excitation.
     """
     rates, periods = np.array([*RATES]), np.array([*RATES.values()])
     chaotic = MOTION_MEANINGS.index("chaotic")

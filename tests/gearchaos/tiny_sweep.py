@@ -1,6 +1,6 @@
-"""A sweep of a few lanes by flow maps, and what happens to it in threads and other processes.
+"""Compute a sweep of a few lanes by flow maps in threads and other processes.
 
-As a script it prints one JSON object of findings; its arguments name how processes are started.
+As a script it prints one JSON object of findings; the arguments name the ways to start processes.
 """
 
 import json
@@ -46,25 +46,26 @@ motion = false
 
 
 def configuration(number: int, *overrides: str) -> gearchaos.Configuration:
-    """Return the tiny sweep, over other speeds for every number: each has maps of its own."""
+    """Return the tiny sweep; each number has other speeds, and therefore its own maps."""
     ends = [f"sweep.{end}={0.5 + 0.02 * number + at}" for end, at in (("from", 0.0), ("to", 0.01))]
     return gearchaos.Configuration.from_toml(TINY, "tiny", [*ends, *overrides])
 
 
 def section(number: int) -> np.ndarray:
-    """Compute the tiny sweep and return a section."""
+    """Compute the tiny sweep and return its section."""
     return gearchaos.run(configuration(number))["section_delta_5"]
 
 
 def in_a_fork_while_a_thread_computes() -> bool:
-    """Whether a process forked while another thread has its turn gets one as well."""
+    """Return whether a process that is forked during the turn of another thread gets a turn too."""
     begun, ended = Event(), Event()
     with ThreadPoolExecutor(1) as pool:
         holding = pool.submit(in_turn(lambda: (begun.set(), ended.wait())))
         begun.wait()
         child = os.fork()
         if child == 0:
-            # In its main thread: another one may have the number of the thread that was not copied.
+            # This is the main thread: a new thread may have the number of the thread that was not
+            # copied.
             signal.alarm(60)
             in_turn(lambda: None)()
             os._exit(0)
@@ -74,7 +75,7 @@ def in_a_fork_while_a_thread_computes() -> bool:
 
 
 def in_processes(how: str, serial: list) -> bool | str:
-    """Whether processes started in this way compute the same, or the error that they give."""
+    """Return whether processes started in this way compute the same, or their error."""
     try:
         with multiprocessing.get_context(how).Pool(2) as processes:
             sections = processes.map_async(section, range(2)).get(timeout=120.0)

@@ -1,8 +1,8 @@
-"""Motions of eq. 13 with pitch errors tooth by tooth, as exact as double precision allows.
+"""Reference motions of eq. 13 with pitch errors of single teeth, exact to double precision.
 
-An adaptive method of order 8 that begins anew wherever the field is not smooth: at every knot of
-the splines between the shares, where sliding changes its sign, and at every crossing of a
-clearance, located by an event.
+An adaptive method of order 8 restarts wherever the vector field is not smooth: at every knot of the
+spline of the shared error, at every change of the sign of sliding, and at every clearance crossing,
+which is located as an event.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ TOLERANCE = 1e-13
 
 
 class Followed(NamedTuple):
-    """State after each mesh period, shape (periods, 10) in the order of `STATES`; crossings."""
+    """States after each mesh period, (periods, 10) in the order of `STATES`, and crossings."""
 
     states: np.ndarray
     crossings: int
 
 
 def error_spline(teeth: Teeth, profile: int, periods: int) -> BSpline:
-    """Return the error that the pairs in mesh share as a spline over mesh periods from 0 on."""
+    """Return the shared error of the pairs in mesh as a spline over the phase in mesh periods."""
     driving, driven = teeth.driving[profile], teeth.driven[profile]
     cells, ago = teeth.cells_per_period, 10
     weights = np.zeros((periods + ago) * cells + teeth.share.size)
@@ -40,7 +40,7 @@ def error_spline(teeth: Teeth, profile: int, periods: int) -> BSpline:
 
 
 class Exact(Twin):
-    """The twin on one contact branch, +1 or -1 on a flank and 0 apart, of each direction."""
+    """The twin on a fixed contact branch in each direction: +1 or -1 on a flank, 0 apart."""
 
     def __init__(
         self, groups: Any, scene: Effects, physical: bool, teeth: Teeth | None, periods: int
@@ -52,7 +52,7 @@ class Exact(Twin):
         if teeth is None:
             return
         error = PPoly.from_spline(error_spline(teeth, groups.profile, periods + 1))
-        # Value, slope and curvature from one call.
+        # One call returns value, slope and curvature.
         orders = [np.pad(error.derivative(order).c, ((order, 0), (0, 0))) for order in range(3)]
         self.shared = PPoly(np.stack(orders, axis=2), error.x)
 
@@ -75,11 +75,11 @@ class Exact(Twin):
         return self.slope(tau, np.concatenate([joint, np.zeros(10)]))[:10]
 
     def gaps(self, tau: float, joint: np.ndarray) -> np.ndarray:
-        """y_1 and y_2 over their clearances."""
+        """y_1 and y_2, divided by their half clearances."""
         return np.array(self.relative(joint[:5], self.error(tau)[0])) / self.limits
 
     def exits(self) -> list:
-        """Events of leaving the branches, each with its direction and the branch that follows."""
+        """One event for each boundary of the branches, with its gap and the branch that follows."""
         events = []
         for way in range(1 + self.scene.axial if self.scene.backlash else 0):
             touching = self.branches[way] != 0
@@ -102,7 +102,7 @@ class Exact(Twin):
             cells = self.teeth.cells_per_period
             knots = np.arange(-cells, periods * cells) / cells + self.teeth.begins
         changes = np.add.outer(np.arange(periods), self.changes_of_sliding()).ravel()
-        # Some knots are ends of periods but for their last digits.
+        # Rounded, because some knots equal ends of periods up to their last digits.
         stops = np.unique(np.round(np.concatenate([knots, changes, np.arange(1, periods + 1)]), 12))
         tau, crossings, states = 0.0, 0, []
         for stop in stops[(stops > 0.0) & (stops <= periods)]:

@@ -1,8 +1,8 @@
-"""A process that has imported Numba and no kernels, and forks for each program that uses them.
+"""Server that has imported Numba but no kernels, and forks for each program that uses kernels.
 
-It reads one JSON list a line: a program, its arguments, more variables of the environment, the
+It reads one JSON list per line: a program, its arguments, additional environment variables, the
 folder of the package of kernels, and the files for stdout and stderr. It answers with the exit
-code. What Numba imports before it compiles anything takes two seconds in a process of its own.
+code. In a new process, the imports of Numba before the first compilation would take two seconds.
 """
 
 import atexit
@@ -25,12 +25,12 @@ FOR_COMPILING = (
     "numba.np.polynomial.polynomial_functions",
     "numba.typed.typedlist",
 )
-"""With what these import, most of what Numba does. None of it asks for the processor: that is for
-the kernels to decide."""
+"""Modules that import most parts of Numba. None of them selects the processor, because this is left
+to the kernels."""
 
 
 def main() -> None:
-    """Serve until the input ends."""
+    """Run programs until the input ends."""
     for name in FOR_COMPILING:
         importlib.import_module(name)
     cpu_target.typing_context.refresh()
@@ -51,7 +51,7 @@ def run(
     out: str,
     err: str,
 ) -> None:
-    """Become the process of one program, for which every warning is an error."""
+    """Run one program in this process and exit; every warning is an error."""
     for descriptor, name in ((1, out), (2, err)):
         os.dup2(os.open(name, os.O_WRONLY), descriptor)
     os.environ.update(variables)

@@ -1,4 +1,4 @@
-"""A second model, which shows what a model needs: x'' + 2 zeta x' + D(x; b) = F + A cos(W tau)."""
+"""Complete example of a second model: x'' + 2 zeta x' + D(x; b) = F + A cos(W tau)."""
 
 from collections import namedtuple
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Lane = namedtuple("Lane", "stiffness damping half_clearance load amplitude speed
 
 @dataclass(frozen=True)
 class Flags:
-    """The oscillator has no effects that could be left out."""
+    """The oscillator has no optional effects."""
 
 
 @dataclass(frozen=True)

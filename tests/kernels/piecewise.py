@@ -1,8 +1,8 @@
-"""Motions of piecewise-linear systems as exact as double precision allows, and random systems.
+"""Reference motions of piecewise-linear systems, exact to double precision, and random systems.
 
-An adaptive method of order 8 integrates on one contact branch at a time, and begins anew at every
-crossing, which it locates as an event. It takes the matrices as they are, before the mass matrix is
-divided out.
+An adaptive method of order 8 integrates on one contact branch at a time. It locates crossings as
+events and restarts there. It uses the original matrices; the kernels use the matrices multiplied by
+the inverse of the mass matrix.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from scipy.integrate import solve_ivp
 TOLERANCE = 1e-13
 
 LONGEST_STEP = 0.05
-"""An event is seen by the signs at both ends of a step: a longer one misses short excursions."""
+"""Events are found from the signs at both ends of a step: longer steps miss short excursions."""
 
 SIZES = [(1, 1), (3, 2), (6, 4)]
 SIZES_OF_MAPS = [(1, 1, 6), (3, 2, 6), (5, 6, 4)]
-"""Coordinates, elements, and number of machines.
+"""Numbers of coordinates, elements and machines.
 
-Among more machines with six elements there are some whose reference has 1e-10 only.
+There are only four machines with six elements: references of others may be accurate to 1e-10 only.
 """
 
 PERIODS = 3
@@ -96,7 +96,7 @@ class Piecewise:
         return np.where(apart, 0.0, self.damping)
 
     def change(self, tau: float, z: np.ndarray, flanks: list[int]) -> np.ndarray:
-        """Return d/dtau of x, x', and of a tangent vector where z has one."""
+        """Return d/dtau of x and x', and of the tangent vector if z contains one."""
         n, waves = self.size, self.waves(tau)[0]
         x, v = z[:n], z[n : 2 * n]
         value, rate = self.gaps(tau, z)
@@ -113,7 +113,7 @@ class Piecewise:
         return np.concatenate(parts)
 
     def periods(self, start: np.ndarray, count: int) -> tuple[np.ndarray, int]:
-        """Return z after each of some periods, (periods, states), and the number of crossings."""
+        """Return z after each period, shape (periods, states), and the number of crossings."""
         period, z, crossings, found = 2.0 * np.pi / self.frequency, start.copy(), 0, []
         flanks = self.flanks(0.0, z)
         for number in range(count):
@@ -128,7 +128,7 @@ class Piecewise:
         return np.array(found), crossings
 
     def piece(self, tau: float, end: float, z: np.ndarray, flanks: list[int]):
-        """Integrate up to the next crossing; return its time, z, element and flank, or the end."""
+        """Integrate to the next crossing or the end; return time, z, element (or -1) and flank."""
         events, targets = [], []
         for element, flank in enumerate(flanks):
             limit = self.half_clearance[element]
@@ -157,7 +157,7 @@ class Piecewise:
         return end, done.y[:, -1], -1, 0
 
     def jumped(self, tau: float, z: np.ndarray, flanks: list[int], element: int, meets: int):
-        """Apply the saltation matrix of a crossing to the tangent vector of z, if it has one."""
+        """Apply the saltation matrix of a crossing to the tangent vector, if z contains one."""
         n = self.size
         if z.size == 2 * n:
             return z
@@ -169,9 +169,10 @@ class Piecewise:
 
 
 def random_machine(seed: int, coordinates: int, elements: int, held: float = 1.0) -> Piecewise:
-    """Return a random system that separates; its elements differ in kind, all entries are there.
+    """Return a random system with contact loss, elements of different kinds and no zero entries.
 
-    ``held``: factor of its springs; if it is not positive, nothing but the elements holds it.
+    ``held``: factor of the springs to the ground; if it is not positive, only the elements hold the
+    system.
     """
     draw = np.random.default_rng(seed)
     rows = draw.normal(size=(elements, coordinates))
@@ -221,13 +222,13 @@ def lanes_of(machines: list[Piecewise]) -> LinearSystems:
 
 
 def alternating(z: np.ndarray, size: int) -> np.ndarray:
-    """Return displacements, then rates, in the order of lanes: each rate after its displacement."""
+    """Reorder states, displacements before rates, to the order of lanes: each x before its x'."""
     return np.stack([z[..., :size], z[..., size : 2 * size]], axis=-1).reshape(*z.shape[:-1], -1)
 
 
 @cache
 def exact(coordinates, elements, count=6):
-    """Return machines with their start, their motion and growth, computed independently."""
+    """Return machines and starts, with reference sections, growths and numbers of crossings."""
     machines = [random_machine(seed, coordinates, elements) for seed in range(count)]
     starts, sections, growths, crossings = [], [], [], []
     for seed, machine in enumerate(machines):
@@ -243,7 +244,7 @@ def exact(coordinates, elements, count=6):
 
 
 def assert_exact(machine: Piecewise, seed: int, plan: Plan) -> None:
-    """Integrate a machine from a random start, and compare it with the adaptive method."""
+    """Integrate a machine from a random start, and compare the motion with the adaptive method."""
     count = len(machine.mass)
     start = np.random.default_rng(seed).normal(size=2 * count) * 0.5
     tangent = np.full(2 * count, 1.0 / np.sqrt(2 * count))

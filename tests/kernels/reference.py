@@ -1,7 +1,7 @@
-"""The pair of Pan 2021 as the kernels take it, and stored solutions of its equations.
+"""The pair of Pan 2021 in the form of the kernels, and stored solutions of its equations.
 
 ``tests/data/pan2021.json`` was computed by an adaptive order-8 method with relative tolerance
-1e-13, restarted at every located clearance crossing: it shares nothing with the kernels.
+1e-13, restarted at every located clearance crossing. The method shares no code with the kernels.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SINE = np.array([1.203, -1.15e-4, -0.1335, 9.478e-8, 0.04819, -3.819e-5])
 SINE /= SOLUTIONS["mean_stiffness"]
 
 FLOW_MAP = "flow_map"
-"""Stands for the other method where steps are plain or resolved."""
+"""Value of ``resolved`` that selects flow maps, in place of plain or resolved steps."""
 
 FULL = Effects()
 NO_AXIAL = Effects(axial=False)
@@ -38,11 +38,11 @@ NO_BACKLASH = Effects(backlash=False)
 LINEAR = Effects(stiffness_variation=False, backlash=False)
 TORSION = Effects(*[False] * len(Effects._fields))
 CLEARANCE = TORSION._replace(backlash=True)
-"""Nothing acts but load, mesh and clearance."""
+"""Only load, mesh and clearance act."""
 
 
 def from_python(formula: Any) -> Callable[..., Any]:
-    """Return a compiled function that calls a formula, which only compiled code can call."""
+    """Return a compiled function that calls a formula; only compiled code can call formulas."""
     compiled: Callable[..., Any] = numba.njit(lambda *arguments: formula(*arguments))
     return compiled
 
@@ -50,7 +50,7 @@ def from_python(formula: Any) -> Callable[..., Any]:
 def pan2021(pitch_error: Any, **groups: Any) -> Groups:
     """Return the model of Pan 2021 for one or several multiples of the pitch error.
 
-    Every other group may be given as a number or with one value per lane.
+    Every other group may be given as a number or as one value per lane.
     """
     multiple = np.atleast_1d(np.asarray(pitch_error, dtype=float))
     values: dict[str, Any] = {
@@ -96,10 +96,10 @@ def system_of(
 
 
 def swinging() -> tuple[GearPairs, float]:
-    """Return a pair that swings in contact without end, half a swing in every period, and how fast.
+    """Return an undamped pair that oscillates in contact, and its angular frequency w.
 
-    Without clearance, damping and load delta_5 = A cos(w tau), w^2 = cos(beta_b), and N_y too; what
-    moves in bearings is a billion times heavier.
+    Without clearance, damping and load, delta_5 = N_y = A cos(w tau) with w^2 = cos(beta_b). A mesh
+    period is half an oscillation. The masses in the bearings are a billion times larger.
     """
     absent = "load", "damping_ratio", "half_backlash", "stiffness_variation_scale"
     heavy = {"mass_ratio_p": 1e-9, "mass_ratio_g": 1e-9}
@@ -109,7 +109,10 @@ def swinging() -> tuple[GearPairs, float]:
 
 
 def drawn_teeth(driving: int, driven: int, lanes: int = 1, contact_ratio: float = 2.26) -> Teeth:
-    """Return errors of so many teeth, other ones in every lane, shared as a trapezoid rises."""
+    """Return random tooth errors, different in every lane.
+
+    The shares follow from contact lines whose length is a trapezoid over the mesh phase.
+    """
     random = np.random.default_rng(driving + 1000 * driven)
     cells_per_period = 20
     place = (np.arange(round(contact_ratio * cells_per_period)) + 0.5) / cells_per_period
@@ -128,18 +131,18 @@ def drawn_teeth(driving: int, driven: int, lanes: int = 1, contact_ratio: float 
 
 
 def columns(effects: Effects) -> list[int]:
-    """Return the columns of a scene's states among all ten."""
+    """Return the indices of a scene's states among all ten states."""
     return [STATES.index(name) for name in effects.states]
 
 
 def state(**values: float) -> np.ndarray:
-    """Return one full state by the names of its components; the others are 0."""
+    """Return one full state with the named components; the others are 0."""
     assert values.keys() <= set(STATES)
     return np.array([values.get(name, 0.0) for name in STATES])
 
 
 def stored_state(values: list[float]) -> np.ndarray:
-    """Return a state of the file, whose order is that of the kernels, with all ten states."""
+    """Return a state of the file, which has the order of the kernels, padded to ten states."""
     return np.pad(np.asarray(values, dtype=float), (0, len(STATES) - len(values)))
 
 
@@ -160,12 +163,11 @@ def run(
     history: int = 0,
     own: np.ndarray | None = None,
 ) -> Outcome:
-    """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
+    """Integrate a model with the mesh stiffness of Pan 2021; by default keep all section points.
 
-    A start has all ten states, the outcome those of the scene. The tangent vector is on unless a
-    test is about the plain loop: one compiled scene then serves many tests. Steps are plain ones
-    unless ``resolved`` splits those that cross a clearance, or is `FLOW_MAP`. ``own``: recorded
-    periods of every lane.
+    A start has all ten states, the outcome has those of the scene. The tangent vector is on by
+    default, so that one compiled scene serves many tests. ``resolved``: False for plain steps, True
+    for resolved steps, or `FLOW_MAP`. ``own``: recorded periods of every lane.
     """
     rest = np.zeros((model.load.size, len(STATES)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)

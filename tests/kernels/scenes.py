@@ -1,4 +1,4 @@
-"""Scenes of the gear pair for formulas that are called by themselves."""
+"""Scenes of the gear pair for tests that call single formulas."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from gearchaos_kernels.scene import Scene
 
 
 def scene_with(flag: bool | None, method: Any = None, **flags: bool | None) -> Scene:
-    """Return a scene all of whose flags are True or None, but for some flags of the model."""
+    """Return a scene whose flags all have one value, except the given flags of the model."""
     names = GearPair.__dataclass_fields__
-    # The only field that is no flag.
+    # The only field that is not a flag.
     every = dict.fromkeys(names, flag) | {"harmonics": None}
     return Scene(
         model=GearPair(**{**every, **flags}),

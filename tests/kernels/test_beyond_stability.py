@@ -1,4 +1,4 @@
-"""Steps longer than the method allows: what becomes of a run that nobody stopped before."""
+"""Runs with steps beyond the stability limit of RK4."""
 
 import numpy as np
 import pytest
@@ -15,14 +15,14 @@ from .reference import (
 from .test_hard_cases import COS, assert_sound
 
 RK4 = pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
-"""Flow maps have no such limit."""
+"""Flow maps have no stability limit."""
 
 
 CONSTANT = {"error_amplitude": 0.0, "stiffness_variation_scale": 0.0}
 
 
 def swinging(radians_a_step: np.ndarray, steps: int = 20, **groups):
-    """Return lanes whose mesh, in contact, turns by so many radians a step."""
+    """Return lanes whose oscillation in contact has the given radians per step."""
     frequency = 2.0 * np.pi * np.sqrt(COS) / (steps * radians_a_step)
     return pan2021(5.86, mesh_frequency=frequency, **groups)
 
@@ -50,9 +50,9 @@ def test_a_run_far_beyond_the_stability_limit_diverges_in_a_few_periods(resolved
 
 @RK4
 def test_just_beyond_the_limit_lost_contact_bounds_what_the_method_blows_up(resolved):
-    # Between 2.83 and 3.3 radians a step the method amplifies in contact and not off the flank:
-    # the run neither diverges nor means anything, in a scene that can only settle. No status tells
-    # it, which is why the limit is computed before a run.
+    # Between 2.83 and 3.3 radians per step the method amplifies in contact, but not apart. The run
+    # does not diverge, but its result is wrong: this scene can only settle. No status reports this;
+    # the limit is therefore computed before a run.
     below, beyond = (swinging(np.array(turns), **CONSTANT) for turns in ([2.5, 2.7], [3.0, 3.1]))
     how = {"steps": 20, "transient": 500, "periods": 500, "points": 10, "resolved": resolved}
     rest = state(delta_5=1.0)
@@ -66,8 +66,8 @@ def test_just_beyond_the_limit_lost_contact_bounds_what_the_method_blows_up(reso
 
 
 def test_split_steps_can_hold_an_unstable_bearing_which_leaps_across_the_clearance():
-    # Its gear leaps from flank to flank in every step, each of which is then split in stable parts.
-    # Plain steps run away. Again no status tells it; the number of crossings does.
+    # The gear jumps from flank to flank in every step, so that each step is split into stable
+    # parts. Plain steps diverge. Again no status reports this; the number of crossings shows it.
     steps = 50
     stiffness = (2.9 * OMEGA * steps / (2.0 * np.pi)) ** 2
     model = pan2021(5.86, transverse_stiffness_p=stiffness)
@@ -82,7 +82,7 @@ def test_split_steps_can_hold_an_unstable_bearing_which_leaps_across_the_clearan
 
 @RK4
 def test_a_lane_out_of_the_range_of_numbers_within_a_period_stops_as_diverged(resolved):
-    # Beyond all numbers, a gap has no moment at which it crosses: nothing is split or counted.
+    # A gap beyond the range of numbers has no time of crossing: no step is split or counted.
     start = np.stack([state(delta_5=value) for value in (1e300, -1e307)])
     outcome = run(swinging(np.full(2, 12.0)), TORSION_ONLY, start, steps=20, resolved=resolved)
     assert outcome.status.tolist() == [Status.DIVERGED] * 2

@@ -1,6 +1,7 @@
-"""Random pairs and starts: finite or flagged, bounded by the energy put in, symmetric, scalable.
+"""Random pairs and starts: motions are finite or flagged, bounded by energy, symmetric, scalable.
 
-All examples have a tangent vector and split steps; few scenes, because each is compiled.
+All examples have a tangent vector and resolved steps. There are few scenes, because each one is
+compiled.
 """
 
 import numpy as np
@@ -28,7 +29,7 @@ LENGTHS = ("load", "half_backlash", "error_mean", "error_amplitude")
 BEARINGS = [f"{way}_{{}}_{gear}" for way in ("transverse", "axial") for gear in "pg"]
 
 SMALLEST = 1e-60
-"""Below this a number is taken as 0: scaled down, it would lose digits near the end of range."""
+"""Smaller numbers are replaced by 0: scaled down, they would lose digits near underflow."""
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -58,7 +59,7 @@ anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.in
 
 
 def pair_of(scene: Effects, given: dict[str, float]) -> Groups:
-    """Return the pair of an example; a loop with a phase of the error is compiled apart."""
+    """Return the pair of an example; some scenes get no error phase, to compile fewer loops."""
     without = {} if scene.backlash and scene != NO_AXIAL else {"error_phase": 0.0}
     return pan2021(0.0, **{**given, **without})
 
@@ -86,12 +87,12 @@ def relative(model: Groups, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def stored_in(y, half_backlash, kappa) -> np.ndarray:
-    """Return the energy of the mesh spring, per unit of the direction's share."""
+    """Return the energy of the mesh spring, without the cosine or sine of the direction."""
     return 0.5 * kappa * np.maximum(np.abs(y) - half_backlash, 0.0) ** 2
 
 
 def energies(model: Groups, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the energy of the torsional and transverse motion, and that of the axial one."""
+    """Return the energy of the torsional and transverse motion, and that of the axial motion."""
     beta, half_backlash = value(model, "base_helix_angle"), value(model, "half_backlash")
     kappa = stiffness_wave(model)[0]
     y_1, y_2 = relative(model, states)
@@ -135,7 +136,7 @@ def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_
     error_rate = frequency * amplitude
     first, first_axial = energies(model, start)
 
-    # Load and inertial term act on delta_5, and the error's rate on the mesh force.
+    # Load and inertial term act on delta_5; the rate of the error acts on the mesh force.
     power = abs(value(model, "load")) + frequency**2 * amplitude
     power += np.sqrt(kappa.max() * cosine) * cosine * error_rate
     leak = 0.5 * ratio * cosine * (cosine * error_rate) ** 2
@@ -143,7 +144,7 @@ def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_
     tangential, axial = energies(model, outcome.section[0])
     assert (tangential <= 1.01 * largest + 1e-6).all()
 
-    # The axial pair is driven by the approach of the gears, whose speed that energy bounds.
+    # The approach of the gears drives the axial motion. The energy above bounds its speed.
     mobility = 1.0 + value(model, "mass_ratio_p") + value(model, "mass_ratio_g")
     driven = np.tan(beta) * np.sqrt(2.0 * mobility * largest) + sine * error_rate
     largest_axial = bound(
@@ -182,14 +183,15 @@ def test_a_motion_is_finite_or_its_lane_says_that_it_is_not(scene, given, start,
 @PROPERTY
 @given(scenes, groups, starts, st.sampled_from([7, 50]))
 def test_a_motion_turned_around_is_the_motion_of_the_pair_turned_around(scene, given, start, steps):
-    # A clearance below the rounding of its gap is left on the side to which that rounds.
+    # If a clearance is smaller than the rounding error of its gap, rounding decides on which side
+    # the gap leaves it.
     assume(given["half_backlash"] == 0.0 or given["half_backlash"] > 1e-12)
     model = pair_of(scene, given)
     turned = {name: -getattr(model, name) for name in LENGTHS if name != "half_backlash"}
     how = {"steps": steps, "periods": PERIODS, "resolved": True}
     one = run(model, scene, start, **how)
     other = run(model._replace(**turned), scene, -start, **how)
-    # Only the signs of section and end state differ, and of their zeros.
+    # Only the signs of section and end state differ, including the signs of zeros.
     assert np.array_equal(other.section, -one.section, equal_nan=True)
     assert np.array_equal(other.end_state, -one.end_state, equal_nan=True)
     same = {"section": one.section, "end_state": one.end_state}
@@ -206,7 +208,7 @@ def test_a_motion_scales_with_every_length_of_its_pair(scene, given, start, step
     one = run(model, scene, start, **how)
     other = run(scaled, scene, factor * start, **how)
     if one.status[0] != Status.OK or other.status[0] != Status.OK:
-        # What is out of range depends on the unit of length.
+        # The unit of length decides which numbers are out of range.
         return
     assert np.array_equal(other.section, factor * one.section)
     assert np.array_equal(other.end_state, factor * one.end_state)

@@ -1,4 +1,4 @@
-"""The cache of compiled code: a second process compiles nothing, and runs only what fits."""
+"""The cache of compiled code: a second process compiles nothing and runs only valid code."""
 
 import atexit
 import functools
@@ -22,8 +22,8 @@ from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 
 PACKAGE = Path(gearchaos_kernels.__file__).parent
 
-# What is asked for are expressions. The Jacobian is the kernel that compiles fastest; `double`, of
-# which every type of argument is compiled for itself, is faster still and cached in the same way.
+# The program evaluates expressions. The Jacobian is the kernel that compiles fastest. `double`
+# compiles even faster, separately for each type of argument, and is cached in the same way.
 PROGRAM = """
 import importlib, json, sys
 import numba, numba.core.ccallback
@@ -74,10 +74,11 @@ def compute(
     without: Sequence[str] = (),
     **variables: str,
 ) -> dict:
-    """Evaluate expressions in a new process and return what it says of its cache.
+    """Evaluate expressions in a new process; return their values and its use of the cache.
 
-    It says nothing on stderr, or one line that contains the complaint. ``without``: names that
-    Numba lacks, such as ``numba.core.codegen.JITCodeLibrary``, or of a class ``module:Class.name``.
+    The process prints nothing to stderr, or one line that contains ``complaint``. ``without``:
+    names to delete from Numba, such as ``numba.core.codegen.JITCodeLibrary``; names of a class have
+    the form ``module:Class.name``.
     """
     arguments = [json.dumps([largest_file, *expressions]), *without]
     environment = {"NUMBA_CACHE_DIR": str(cache), **variables}
@@ -117,7 +118,7 @@ def cache(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def first(cache) -> dict:
-    """What the first process, with an empty cache, says."""
+    """Result of the first process, which has an empty cache."""
     return compute(cache, TORSIONAL)
 
 
@@ -135,7 +136,7 @@ def test_a_second_process_compiles_only_scenes_that_none_has_seen(cache, first):
 
 @pytest.mark.slow
 def test_kept_code_runs_without_the_imports_of_a_compiler(tmp_path):
-    # Not in `numba_server`, which has imported all of them.
+    # Not run in `numba_server`, which has already imported these modules.
     names = "numba.np.arrayobj", "numba.np.linalg", "scipy.linalg"
     imported = f"[name for name in {names} if name in sys.modules]"
     words = [sys.executable, "-c", PROGRAM, json.dumps([0, TORSIONAL, imported])]
@@ -144,7 +145,7 @@ def test_kept_code_runs_without_the_imports_of_a_compiler(tmp_path):
         said = subprocess.run(words, env={**os.environ, **folders}, capture_output=True, check=True)
         outcome = json.loads(said.stdout)
         assert (outcome["hits"], outcome["misses"]) == (hits, misses)
-        # The first process compiles, with all that this needs.
+        # The first process compiles and imports the modules that it needs for this.
         assert ("numba.np.linalg" in outcome["values"][1]) == (misses == 1)
     assert outcome["values"][1] == []
 
@@ -230,7 +231,7 @@ def test_a_numba_without_what_speeds_up_compilation_computes_the_same(first, tmp
     without = ["numba.core.codegen.JITCodeLibrary", "numba.core.cpu.CPUTargetOptions"]
     without += ["numba.core.event", "numba.misc.appdirs.user_cache_dir"]
     outcome = compute(tmp_path, TORSIONAL, without=without)
-    # Other code may round in another order.
+    # The compiled code may differ and round differently.
     np.testing.assert_allclose(outcome["values"], first["values"], rtol=1e-14)
     assert compute(tmp_path, TORSIONAL, without=without)["hits"] == 1
 
@@ -261,7 +262,7 @@ def test_compiled_code_lies_outside_the_installed_packages(cache, first):
     assert list(PACKAGE.rglob("*.nb?")) == []
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other cache folders")
+@pytest.mark.skipif(sys.platform != "linux", reason="tests the cache folder of Linux")
 def test_without_a_setting_the_cache_lies_in_the_users_cache_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("numba.config.CACHE_DIR", "")
     monkeypatch.chdir(tmp_path)
@@ -283,7 +284,7 @@ def test_folders_that_are_made_are_private(tmp_path, monkeypatch):
 
 
 def _refused(tmp_path, monkeypatch, caplog) -> str:
-    """Return why a folder is not used; a private temporary one is used instead."""
+    """Return the reason why a folder is not used; a private temporary folder replaces it."""
     monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "parent" / "cache"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     # Packages that other tests use may have configured the logging of this process.
@@ -306,7 +307,7 @@ def test_a_cache_folder_that_cannot_be_made_is_not_used(tmp_path, monkeypatch, c
     assert f"File exists: '{tmp_path / 'parent'}'" in _refused(tmp_path, monkeypatch, caplog)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes and owners are those of POSIX")
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs POSIX file modes and owners")
 @pytest.mark.parametrize(
     ("name", "mode"),
     [
@@ -325,7 +326,7 @@ def test_a_cache_folder_that_others_can_write_or_replace_is_not_used(
     assert f"others can write in {tmp_path / name}" in _refused(tmp_path, monkeypatch, caplog)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes and owners are those of POSIX")
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs POSIX file modes and owners")
 def test_a_sticky_parent_such_as_tmp_is_fine(tmp_path, monkeypatch, caplog):
     (tmp_path / "parent").mkdir()
     (tmp_path / "parent").chmod(0o1777)
@@ -334,7 +335,9 @@ def test_a_sticky_parent_such_as_tmp_is_fine(tmp_path, monkeypatch, caplog):
     assert caplog.records == []
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.skipif(
+    os.name != "posix" or os.geteuid() != 0, reason="only root can change the owner of a file"
+)
 @pytest.mark.parametrize("name", ["parent/cache/name", "parent"])
 def test_a_cache_folder_of_another_user_is_not_used(name, tmp_path, monkeypatch, caplog):
     (tmp_path / "parent" / "cache" / "name").mkdir(parents=True)
@@ -349,5 +352,5 @@ def test_an_unwritable_home_does_not_stop_a_computation(tmp_path):
     home = {"NUMBA_CACHE_DIR": "", "HOME": str(blocked), "XDG_CACHE_HOME": ""}
     outcome = compute(tmp_path, REAL, complaint=str(blocked), **home)
     assert outcome["values"] == [3.0]
-    # What cannot be kept does not litter.
+    # The temporary folder is removed at the end.
     assert not Path(outcome["folder"]).exists()

@@ -1,4 +1,4 @@
-"""Extremes and amplitudes of chosen states, against analytic motions, transforms and finer ones."""
+"""Extremes and amplitudes of chosen states against analytic motions, transforms and fine steps."""
 
 from fractions import Fraction
 
@@ -11,11 +11,11 @@ from .reference import assert_same_bits, pan2021, state, swinging, system_of
 SMALLEST, LARGEST = range(2)
 ORDERS = tuple(map(Fraction, ("1/3", "1/2", "1", "3/2", "2", "3")))
 CHOSEN = ("delta_5", "delta_5_rate", "delta_2", "delta_4", "delta_4_rate")
-"""The displacements of the driven gear have the other sign within the kernels."""
+"""Within the kernels, the displacements of the driven gear have the opposite sign."""
 PLAN = Plan(200, 400, 12, 1, tangent=True, contact=True, loads=True)
 TOLD = PLAN._replace(states=CHOSEN, orders=ORDERS)
 MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
-"""Held, on the driving flank once a period, and of period 2."""
+"""Lane 0 is held, the others meet the driving flank once per period; lane 3 has period 2."""
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def told():
 
 
 def motion_of(steps):
-    """Return the recorded motion, from its beginning, and its transmission error at every step."""
+    """Return the chosen states and the transmission error at every step of the record."""
     plan = Plan(steps, 400, 12, 1, tangent=True, history_periods=12)
     history = integrate(system_of(MODEL), np.zeros((4, 10)), plan).history
     error = history[..., 0] + mesh_motion(system_of(MODEL), history, steps).pitch_error
@@ -38,7 +38,7 @@ def fine():
 
 
 def lines_of(motion):
-    """Return the amplitudes of a motion at the orders by a transform of 12 periods."""
+    """Return the amplitudes of a motion at the orders, from a transform of 12 periods."""
     lines = np.abs(np.fft.rfft(motion[:, 1:], axis=1, norm="forward"))
     return 2.0 * np.moveaxis(lines[:, [int(12 * order) for order in ORDERS]], 1, 2)
 
@@ -46,16 +46,16 @@ def lines_of(motion):
 def test_a_swinging_mass_has_one_line_and_the_extremes_of_a_sine():
     amplitude, steps = 0.7, 200
     system, frequency = swinging()
-    # Half a swing in every mesh period: delta_5 turns where a step ends, its rate in between.
+    # A mesh period is half an oscillation: delta_5 turns at its ends, the rate in its middle.
     plan = PLAN._replace(transient_periods=0, states=("delta_5", "delta_5_rate"), orders=ORDERS)
     plan = plan._replace(resolved=False, contact=False)
     outcome = integrate(system, state(delta_5=amplitude)[np.newaxis], plan)
     sizes = np.array([amplitude, amplitude * frequency])
     assert outcome.extremes[0] == pytest.approx(np.outer(sizes, [-1.0, 1.0]), rel=1e-7)
     expected = np.outer([*sizes, amplitude], [order == Fraction(1, 2) for order in ORDERS])
-    # The method loses a little of the swing, and of its phase.
+    # RK4 slightly reduces the amplitude and shifts the phase.
     assert outcome.amplitudes[0] == pytest.approx(expected, abs=1e-7)
-    # Begun where it turns within a step, it is the cubic that reaches the full height.
+    # From this start, delta_5 turns within a step, and the cubic must reach the full amplitude.
     angle = 0.4 * np.pi / steps
     start = state(delta_5=amplitude * np.cos(angle), delta_5_rate=sizes[1] * np.sin(angle))
     between = integrate(system, start[np.newaxis], plan)
@@ -80,7 +80,7 @@ def test_extremes_and_amplitudes_are_those_of_the_motion_at_sixteen_times_the_st
     size = np.abs(fine).max(axis=1)
     ends = np.stack([fine.min(axis=1), fine.max(axis=1)], axis=2)[:, :-1]
     apart = np.abs(told.extremes - ends) / size[:, :-1, np.newaxis]
-    # Gears on stiff bearings swing eight times in a period.
+    # Gears on stiff bearings oscillate eight times per period.
     assert apart[:, :2].max() < 2e-6
     assert apart[:, 2:].max() < 3e-5
     assert (np.abs(told.amplitudes - lines_of(fine)) < 2e-5 * size[..., np.newaxis]).all()

@@ -1,4 +1,4 @@
-"""Contact branches, and the first moment at which a gap leaves one, against slow obvious twins."""
+"""Contact branches, and the first time at which a gap leaves one, against simple references."""
 
 import itertools
 import math
@@ -39,13 +39,16 @@ settings.register_profile("contact", derandomize=True, deadline=None, max_exampl
 PROPERTY = settings.get_profile("contact")
 
 ROUNDING = 1e-12
-"""Of a cubic, relative to the numbers that give it; Newton's method stops at its square root."""
+"""Rounding error of a cubic, relative to the numbers that define it.
+
+Newton's method stops when a correction is below the square root of this number.
+"""
 
 HALF_BACKLASH = 0.75
 
 
 def moving(value: float, rate: float) -> Gap:
-    """Return a gap whose flanks approach at its own rate."""
+    """Return a gap whose speed of approach is its own rate."""
     return Gap(value, rate, rate)
 
 
@@ -69,7 +72,7 @@ def size_of(curve: np.polynomial.Polynomial) -> float:
 
 
 def turning_points(curve: np.polynomial.Polynomial) -> np.ndarray:
-    """Return where a cubic turns within the step."""
+    """Return the turning points of a cubic within the step."""
     roots = np.roots(curve.deriv().coef[::-1])
     real = roots.real[np.abs(roots.imag) < 1e-9]
     return np.sort(real[(real > 0.0) & (real < 1.0)])
@@ -84,7 +87,7 @@ def lowest(curve: np.polynomial.Polynomial, start: float, end: float) -> float:
 
 
 def twin_of_first_fall(curve: np.polynomial.Polynomial) -> float:
-    """Return where a cubic falls below zero: the first of its real roots with a fall behind it."""
+    """Return where a cubic first falls below zero: at 0 or at a real root followed by a fall."""
     roots = np.roots(curve.coef[::-1])
     real = np.sort(roots.real[np.abs(roots.imag) < 1e-9])
     inner = real[(real > 0.0) & (real < 1.0)]
@@ -96,7 +99,7 @@ def twin_of_first_fall(curve: np.polynomial.Polynomial) -> float:
 
 
 def assert_is_the_first_fall(curve: np.polynomial.Polynomial) -> None:
-    """Compare what is found with all that a first fall means."""
+    """Check that the result has all properties of a first fall below zero."""
     found = first_fall(*ends(curve))
     nearly = 10.0 * ROUNDING * size_of(curve)
     if found == NEVER:
@@ -149,7 +152,7 @@ def test_a_cubic_of_three_known_roots_falls_at_the_first_of_them_behind_which_it
 @pytest.mark.parametrize("depth", [1e-1, 1e-4, 1e-8, 1e-11])
 @pytest.mark.parametrize("at", [0.05, 0.3, 0.5, 0.8, 0.95])
 def test_a_dip_within_one_step_is_found_however_shallow(at, depth):
-    # (t - at)^2 - depth: above zero at both ends, below it around the middle of the dip.
+    # (t - at)^2 - depth is positive at both ends and negative in the middle of the dip.
     depth = min(depth, 0.9 * at**2, 0.9 * (1.0 - at) ** 2)
     found = first_fall(at**2 - depth, -2.0 * at, (1.0 - at) ** 2 - depth, 2.0 * (1.0 - at))
     assert found == pytest.approx(at - math.sqrt(depth), rel=0, abs=1e-6)
@@ -165,14 +168,14 @@ def test_a_turn_just_above_zero_is_no_fall(at):
 
 @pytest.mark.parametrize("rate", [0.5, 1e-3, 1e-8, 1e-14, 1e-17, 1e-20, 1e-300])
 def test_a_step_that_begins_at_the_boundary_does_not_take_its_own_beginning_for_a_crossing(rate):
-    # rate t + t^2 - 2 t^3 rises from zero, however slowly, and falls through it near 1/2.
+    # rate t + t^2 - 2 t^3 rises from zero, even for a tiny rate, and crosses zero again near 1/2.
     found = first_fall(0.0, rate, rate - 1.0, rate - 4.0)
     assert found == pytest.approx((1.0 + math.sqrt(1.0 + 8.0 * rate)) / 4.0, rel=0, abs=1e-9)
 
 
 @pytest.mark.parametrize("zero", [0.0, -0.0])
 def test_a_step_that_begins_at_rest_at_the_boundary_follows_its_acceleration(zero):
-    # 2 t^2 - 3 t^3 rises first and falls at 2/3; turned around it falls at once.
+    # 2 t^2 - 3 t^3 rises first and crosses zero at 2/3; with the opposite sign it falls at once.
     assert first_fall(0.0, zero, -1.0, -5.0) == pytest.approx(2.0 / 3.0, rel=0, abs=1e-9)
     assert first_fall(0.0, zero, 1.0, 5.0) == 0.0
 
@@ -200,7 +203,7 @@ rate = st.one_of(st.floats(-6.0, 6.0), st.just(0.0))
 
 
 def distance_inside(curve: np.polynomial.Polynomial, branch: ContactBranch) -> np.ndarray:
-    """Return how far a gap is inside its branch, at many instants and where it turns."""
+    """Return how far a gap lies inside its branch, at many times and at turning points."""
     gaps = curve(np.concatenate([SAMPLES, turning_points(curve)]))
     if branch.engaged:
         return math.copysign(1.0, branch.offset) * gaps - HALF_BACKLASH
@@ -235,7 +238,7 @@ def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
     )
     if not leaves or may_leave(moving(gap0, rate0), moving(gap1, rate1), branch):
         return
-    # Only what rounding sees outside is missed.
+    # The test may miss only excursions within the rounding error.
     nearly = 10.0 * ROUNDING * (size_of(curve) + HALF_BACKLASH)
     assert distance_inside(curve, branch).min() >= -nearly
 
@@ -265,7 +268,7 @@ def test_a_gap_at_rest_is_not_suspected(gap):
 
 @pytest.mark.parametrize("far", [3.0, -3.0])
 def test_a_gap_far_from_the_boundary_is_not_suspected_whatever_it_does(far):
-    # Most steps are of this kind: they must not come to the scalar path.
+    # Most steps are of this kind, and must not take the scalar path.
     for rate0 in (-2.0, 0.0, 2.0):
         for rate1 in (-2.0, 0.0, 2.0):
             assert not may_leave(

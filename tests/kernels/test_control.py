@@ -1,4 +1,4 @@
-"""Control of an input: against NumPy, its tangent vector, its noise, and determinism."""
+"""Control of an input: results against NumPy, tangent vector, noise and determinism."""
 
 import numpy as np
 import pytest
@@ -21,13 +21,13 @@ def split_mix(number: int) -> int:
 
 
 def gaussian(seed: int, number: int) -> float:
-    """Return a normally distributed number, the quantile of a uniform one."""
+    """Return a normally distributed number, the quantile of a uniform number."""
     share = (float(split_mix((seed + (number + 1) * GOLDEN) % WHOLE) >> 12) + 0.5) * 2.0**-52
     return float(ndtri(share))
 
 
 def oscillators(lanes: int) -> Oscillators:
-    """Return oscillators of different loads that cross their clearance."""
+    """Return oscillators with different loads that cross their clearance."""
     one = np.ones(lanes)
     load = np.linspace(0.1, 0.3, lanes)
     return Oscillators(0.7 * one, 0.05 * one, 0.2 * one, load, 0.4 * one)
@@ -61,7 +61,7 @@ def test_each_input_is_what_the_gain_demands(method: str, steps: int) -> None:
 
 @pytest.mark.parametrize(("method", "steps"), METHODS)
 def test_an_input_acts_as_a_load_of_this_size(method: str, steps: int) -> None:
-    """Each mesh period by itself, with the load that the controller has chosen."""
+    """Each mesh period is integrated separately, with the load that the controller has chosen."""
     system, control = oscillators(5), controlled(5)
     plan = Plan(steps, 0, 6, 6, tangent=True, method=method, contact=True)
     outcome = integrate(system.controlled(control), np.zeros((5, 2)), plan)
@@ -73,7 +73,7 @@ def test_an_input_acts_as_a_load_of_this_size(method: str, steps: int) -> None:
         np.testing.assert_allclose(outcome.section[:, period], state, atol=1e-14)
 
 
-# RK4 with few steps: its tangent vector is not the derivative of a step that crosses a boundary.
+# RK4 needs many steps: its tangent vector is not the derivative of a step across a boundary.
 @pytest.mark.parametrize(("method", "steps"), [("rk4", 400), ("flow_map", 8)])
 def test_the_tangent_vector_is_that_of_the_closed_loop(method: str, steps: int) -> None:
     system, control = oscillators(1), controlled(1)._replace(limit=np.full(1, 10.0))
@@ -95,7 +95,7 @@ def test_the_tangent_vector_is_that_of_the_closed_loop(method: str, steps: int) 
 
 
 def test_an_estimate_follows_its_equations() -> None:
-    """The estimate of the kernel against the same recursion in NumPy, noise included."""
+    """The estimate of the kernel equals the same recursion in NumPy, including the noise."""
     rng = np.random.default_rng(5)
     lanes, system = 3, oscillators(3)
     control = controlled(lanes)._replace(
@@ -131,7 +131,7 @@ def test_delayed_feedback_compares_with_an_earlier_state() -> None:
 
 
 def test_noise_is_normal() -> None:
-    """The noise of the reference, which the estimates of the kernel contain."""
+    """This is the noise of the reference; the kernel uses the same noise in its estimates."""
     drawn = np.array([gaussian(11, n) for n in range(4000)])
     assert abs(drawn.mean()) < 4.0 / np.sqrt(4000)
     assert drawn.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(8000))

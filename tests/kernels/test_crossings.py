@@ -1,6 +1,6 @@
-"""Steps that are split where a clearance is crossed: the order of the method holds there.
+"""Resolved steps keep the order of the method where a clearance is crossed.
 
-States and numbers of crossings of the stored runs and orbits: `test_oracle`.
+`test_oracle` checks states and numbers of crossings of the stored runs and orbits.
 """
 
 import numpy as np
@@ -86,7 +86,7 @@ def test_an_orbit_crosses_the_known_number_of_times_in_every_period(orbit):
 
 
 def test_no_crossing_is_counted_twice_wherever_in_its_step_it_falls():
-    # Neighbours of one period-1 motion: their crossings fall everywhere within the steps.
+    # Neighbouring motions of period 1: their crossings lie at all places within the steps.
     lanes, periods = 320, 50
     model = pan2021(np.linspace(5.0, 7.0, lanes))
     outcome = run(model, FULL, steps=100, transient=600, periods=periods, points=1, resolved=True)
@@ -105,13 +105,13 @@ def test_crossings_are_counted_in_the_recorded_periods_only():
 
 
 SPEEDS = 0.3, 0.5
-"""Load and half backlash of a free oscillation that leaves its flank by a little or by a lot."""
+"""Load and half backlash of a free oscillation that leaves its flank."""
 
 
 @pytest.mark.parametrize("excess", [1e-2, 0.1, 0.5, 1.0])
 def test_the_slowest_crossing_is_the_one_that_energy_gives(excess):
-    # An oscillation about the loaded equilibrium leaves the flank where its amplitude exceeds the
-    # static deflection, and comes back as fast as it left.
+    # An oscillation about the loaded equilibrium leaves the flank if its amplitude exceeds the
+    # static deflection, and returns with the same speed.
     load, half_backlash = SPEEDS
     cosine = np.cos(BASE_HELIX_ANGLE)
     deflection = load / cosine
@@ -130,12 +130,12 @@ def test_the_slowest_crossing_is_the_one_that_energy_gives(excess):
 
 
 def test_the_slowest_crossing_of_the_axial_clearance_is_a_speed_of_y_2():
-    # A lane in which the tangential clearance is never crossed, and the axial one is.
+    # This lane crosses the axial clearance, but never the tangential clearance.
     model = pan2021(0.0, load=0.0, damping_ratio=0.0, axial_damping_p=0.0, axial_damping_g=0.0)
     still = "axial_stiffness_p", "axial_stiffness_g", "stiffness_variation_scale"
     model = model._replace(**dict.fromkeys(still, np.zeros(1)))
     speed = 0.3
-    # y_2 runs from 0 through the clearance at constant speed and springs back at the flank.
+    # y_2 moves from 0 through the clearance at constant speed and rebounds at the flank.
     outcome = run(model, FULL, state(delta_3_rate=speed), steps=200, periods=2, resolved=True)
     assert outcome.crossings[0] >= 2
     assert outcome.slowest_crossing[0] == pytest.approx(speed, rel=1e-5)
@@ -152,7 +152,7 @@ def test_without_a_crossing_the_slowest_one_is_infinite():
 
 
 def test_a_step_that_crosses_too_often_is_counted_and_never_silent():
-    # The mesh would oscillate more than once within one step, which RK4 cannot follow.
+    # The mesh would oscillate more than once per step. RK4 cannot follow this.
     lanes = 64
     steps = 20
     swing = np.linspace(6.6, 12.0, lanes)
@@ -171,7 +171,7 @@ def test_without_backlash_resolved_steps_are_the_plain_ones(scene):
     assert not resolved.crossings.any()
 
 
-# Fast enough to cross the clearance in every scene.
+# These starts are fast enough to cross the clearance in every scene.
 FAST = START + np.stack(
     [
         state(delta_5_rate=-1.5, delta_3_rate=1.5, delta_4_rate=-1.5),
@@ -188,7 +188,7 @@ def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matt
         for steps, tolerance in ((400, 2e-5), (800, 1.5e-6)):
             resolved = run(IN_PHASE, scene, FAST, steps=steps, **how, resolved=True)
             assert resolved.section == pytest.approx(fine.section, rel=0, abs=tolerance)
-            # A plain tangent vector has an error of first order in every step that crosses.
+            # With plain steps, the tangent vector has a first-order error at every crossing.
             assert resolved.growth == pytest.approx(fine.growth, rel=0, abs=2e-3)
             assert (resolved.crossings > 0).all()
 

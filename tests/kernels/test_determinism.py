@@ -1,4 +1,4 @@
-"""The same bits for any number of threads, any split, any order and any neighbours."""
+"""Results have the same bits for any number of threads and any split, order and neighbours."""
 
 from collections.abc import Callable
 
@@ -12,12 +12,12 @@ from .reference import FLOW_MAP, FULL, assert_same_bits, lanes_of, lanes_out_of,
 TOTAL = 3 * LANES + 4
 MODEL = pan2021(
     np.linspace(0.0, 15.0, TOTAL),
-    # Lanes that share their maps are integrated together, wherever they stand.
+    # Lanes with the same maps are integrated together, also if they are not neighbours.
     mesh_frequency=np.resize([0.7, 0.9, 1.0, 1.3, 1.4], TOTAL),
     load=np.linspace(0.2, 0.3, TOTAL),
 )
 START = np.random.default_rng(7).uniform(-1.5, 1.5, (TOTAL, 10))
-# Two lanes that diverge: one in its first period, one later.
+# Two lanes diverge: one in its first period, one later.
 START[40] = state(delta_5=np.nan)
 MODEL.transverse_damping_g[77] = -1.8
 HOW = {"steps": 72, "transient": 10, "periods": 20, "points": 15}
@@ -28,7 +28,7 @@ WAYS = [False, True, FLOW_MAP]
 
 @pytest.fixture(scope="module", params=WAYS, ids=["plain", "resolved", "flow-map"])
 def integrate(request) -> Callable[..., Outcome]:
-    """What integrates some lanes of this test, with plain steps, split ones, or by flow maps."""
+    """Function that integrates lanes of this test by plain steps, resolved steps or flow maps."""
 
     def some(chosen) -> Outcome:
         model, start = lanes_of(MODEL, chosen), START[chosen]
@@ -52,7 +52,7 @@ def test_two_lanes_of_this_test_diverge_and_the_others_differ_from_one_another(i
     assert whole.diverged_period[40] == 0
     assert whole.diverged_period[77] > HOW["transient"]
     assert np.unique(whole.end_state[:, 0]).size == TOTAL - 1
-    # Where steps are split lanes cross, and no two alike; plain ones count no crossings.
+    # With resolved steps all lanes cross, at different speeds; plain steps count no crossings.
     assert np.unique(whole.slowest_crossing).size == (TOTAL if integrate.resolved else 1)
 
 

@@ -1,4 +1,4 @@
-"""A lane that leaves the range of numbers says so and harms nobody."""
+"""A lane that leaves the range of numbers is flagged and does not affect other lanes."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ REST = np.zeros((LANES, 10))
 
 @pytest.fixture(params=[False, True], ids=["plain", "resolved"])
 def how(request):
-    """Plain steps, or such as are split where they cross the clearance."""
+    """Plain steps or resolved steps."""
     return {**HOW, "resolved": request.param}
 
 
@@ -32,7 +32,7 @@ def healthy():
 
 
 def assert_only_one_lane_diverged(outcome, model, start, how):
-    """Compare all other lanes with a run that never had the sick one."""
+    """Compare all other lanes with a run without the diverging lane."""
     assert np.flatnonzero(outcome.status == Status.DIVERGED).tolist() == [SICK]
     others = np.delete(np.arange(LANES), SICK)
     assert (outcome.diverged_period[others] == -1).all()
@@ -43,7 +43,7 @@ def assert_only_one_lane_diverged(outcome, model, start, how):
 
 
 def assert_nan_from(outcome, period):
-    """The outputs of the sick lane end with the period before ``period``."""
+    """Check that the outputs of the diverging lane are NaN from ``period`` on."""
     assert outcome.diverged_period[SICK] == period
     assert np.isnan(outcome.end_state[SICK]).all()
     first_point = HOW["transient"] + HOW["periods"] - HOW["points"]
@@ -56,8 +56,8 @@ def assert_nan_from(outcome, period):
 def test_a_step_too_long_for_stiff_bearings_diverges_and_leaves_its_neighbours_untouched(how):
     model = healthy()
     step = 2.0 * np.pi / model.mesh_frequency[SICK] / STEPS
-    # RK4 is stable on an oscillator up to h omega = 2.8. A gear that leaps across the clearance in
-    # every step has each of them split in parts, which are stable up to twice as much and more.
+    # RK4 is stable for an oscillator up to h omega = 2.8. If a gear jumps across the clearance in
+    # every step, each step is split into parts. They are stable up to twice this value or more.
     model.transverse_stiffness_p[SICK] = ((8.0 if how["resolved"] else 3.2) / step) ** 2
     outcome = run(model, FULL, **how)
     assert_only_one_lane_diverged(outcome, model, REST, how)
@@ -114,7 +114,7 @@ def test_all_lanes_may_diverge(how):
 
 
 def test_a_growth_beyond_all_numbers_is_not_reported_as_a_sound_lane():
-    # At rest without load nothing moves, but the tangent vector runs away with the step.
+    # At rest without load nothing moves, but these steps are unstable: the tangent vector diverges.
     model = pan2021(0.0, load=0.0, transverse_stiffness_p=1e12)
     how = {"steps": 100, "periods": 5, "resolved": True}
     outcome = run(model, FULL, **how)

@@ -20,7 +20,7 @@ SCENES = [
     Effects(stiffness_variation=False),
 ]
 FOLLOWED = [FULL, Effects(axial=False), Effects(pitch_error=False, backlash=False)]
-"""Scenes of motions, each of which is compiled; `test_twin` has the same formulas in more."""
+"""Few scenes, because each one is compiled; `test_twin` has the same formulas in more scenes."""
 APART, DRIVING_FLANK, BACK_FLANK = 0, 1, 2
 
 
@@ -38,7 +38,7 @@ def lane(groups: Groups, number: int) -> SimpleNamespace:
 
 
 def accelerations(twin: Twin, tau: float, full: np.ndarray) -> np.ndarray:
-    """Return the five accelerations of the twin at one state of ten, order of `STATES`."""
+    """Return the five accelerations of the twin at one state, in the order of `STATES`."""
     joint = np.concatenate([full[0::2], full[1::2], np.zeros(10)])
     return twin.slope(tau, joint)[5:10]
 
@@ -53,7 +53,8 @@ def test_the_jacobian_is_that_of_the_printed_equations_on_every_branch(scene):
             [np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)]
         )
         kept = columns(scene)
-        # Approach 5 with and without the axial approach that undoes it, and nothing at all.
+        # Approach 5 without and with the axial motion that cancels it in y_2, axial motion only,
+        # and no motion.
         for approach, taken_back in ((5.0, 0.0), (5.0, 5.0 * tangent), (0.0, 2.0), (0.0, 0.0)):
             point = np.zeros(10)
             point[[STATES.index("delta_5"), STATES.index("delta_3")]] = approach, taken_back
@@ -77,7 +78,7 @@ def test_the_jacobian_is_that_of_the_printed_equations_on_every_branch(scene):
 def test_accelerations_are_those_of_the_twin(scene):
     groups = three_lanes()
     if scene != FULL:
-        # A phase is an effect of its own; without it other tests have compiled the scene.
+        # A phase needs another loop; other tests have compiled these scenes without a phase.
         groups = groups._replace(error_phase=np.zeros(3))
     kept = columns(scene)
     full = np.random.default_rng(1).normal(0.0, 2.0, (3, SAMPLES, len(STATES)))
@@ -104,7 +105,7 @@ def with_delta_5(values) -> np.ndarray:
 
 
 def test_the_statically_loaded_mesh_rests():
-    """Clearance taken up, and the spring compressed until cos(beta_b) N_y carries the load."""
+    """The clearance is closed, and the spring is compressed until cos(beta_b) N_y is the load."""
     groups = pan2021(0.0, stiffness_variation_scale=0.0)
     cosine = np.cos(groups.base_helix_angle)
     y_1 = groups.half_backlash * cosine + groups.load / cosine
@@ -114,7 +115,7 @@ def test_the_statically_loaded_mesh_rests():
 
 
 def test_both_gears_get_the_same_force_in_opposite_directions():
-    """From rest, masses times accelerations add up to nothing in either direction."""
+    """From rest, the sum of mass times acceleration is zero in both directions."""
     groups = pan2021([3.0, 9.0])
     states = np.repeat(with_delta_5(np.linspace(-3.0, 3.0, SAMPLES)), 2, axis=0)
     motion = mesh_motion(system_of(groups), states, STEPS)
@@ -141,7 +142,7 @@ def test_the_clearance_reports_the_contact():
     motion = mesh_motion(system_of(groups), with_delta_5(places), STEPS)
     contacts = [BACK_FLANK] * 2 + [APART] * 3 + [DRIVING_FLANK] * 2
     assert motion.contact_tangential[0].tolist() == contacts
-    # The driving flank in one direction is the back flank in the other: y_2 = -tan(beta_b) y_1.
+    # The driving flank of one direction is the back flank of the other: y_2 = -tan(beta_b) y_1.
     turned = [{1: 2, 2: 1}.get(contact, 0) for contact in contacts]
     assert motion.contact_axial[0].tolist() == turned
     pressed = np.array([-edge, 0.0, 0.0, 0.0, 0.0, 0.0, edge])

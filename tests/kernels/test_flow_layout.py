@@ -1,4 +1,4 @@
-"""Rows and numbers of flow maps follow from the terms of their polynomials, and none overlap."""
+"""Parts of flow maps in memory never overlap, for any number of terms of the polynomials."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ SCENE = scene_with(True, method=FlowMap(), teeth=None, wide=None, undamped=None)
 
 
 def layout_with(terms: int) -> dict[str, Any]:
-    """Return the names of the module were its polynomials to have this number of terms."""
+    """Return the names of the module, executed with this number of terms of the polynomials."""
     path = Path(layout.__file__)
     text, names = path.read_text(encoding="utf-8"), {"__name__": layout.__name__}
     exec(compile(text.replace("\nTERMS = 16\n", f"\nTERMS = {terms}\n"), path, "exec"), names)
@@ -24,7 +24,7 @@ def layout_with(terms: int) -> dict[str, Any]:
 
 
 def assert_apart(parts: list[tuple[int, int]], end: int) -> None:
-    """Make sure that parts, each a place and a size, neither overlap nor reach beyond the end."""
+    """Check that parts, each a place and a size, do not overlap and do not exceed the end."""
     for (place, size), (following, _) in pairwise([*sorted(parts), (end, 0)]):
         assert place + size <= following
 

@@ -1,4 +1,4 @@
-"""Flow maps: exact on a contact branch, from crossing to crossing, whatever the step."""
+"""Flow maps are exact on a contact branch, between crossings, for any step."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ from .test_linear import steady_state, system
 from .test_oracle import ORBITS, RUNS, error, follow, name_of, scene_of
 
 STEPS = 24
-"""Steps a period where nobody asks for others."""
+"""Steps per period, unless a test sets others."""
 
 SCENES = (TORSION_ONLY, NO_AXIAL, FULL)
 SOLUTIONS = [solution for solution in RUNS + ORBITS if scene_of(solution) in SCENES]
@@ -40,7 +40,7 @@ SOLUTIONS = [solution for solution in RUNS + ORBITS if scene_of(solution) in SCE
 @pytest.mark.parametrize("solution", SOLUTIONS, ids=name_of)
 def test_every_stored_solution_is_met_with_all_its_crossings(solution):
     turns = 2 if "section_points" in solution else 1
-    # From rest at P = 12.97 chaos makes 3e-11 of the 1e-13 to which the solutions were computed.
+    # The solutions were computed to 1e-13. From rest at P = 12.97 chaos amplifies this to 3e-11.
     largest = 1e-9 if solution["pitch_error"] == 12.97 else 1e-11
     for steps in (STEPS, 48):
         outcome = follow(solution, steps, resolved=FLOW_MAP)
@@ -124,13 +124,13 @@ def test_the_memory_of_maps_is_predicted_within_a_factor_of_two(scene, steps):
         compiled = compiled_scene(pair, plan)
         _, places = maps_of(pair, steps, compiled)
         made = 8 * places[0, 0] * layout_of(compiled).step_size
-        # Those kept and those being made.
+        # The prediction includes maps that are kept and maps that are being made.
         told = maps_memory(pair, plan, fewest_stable_steps(pair))
         assert 1 <= told / (2 * made) <= 2
 
 
 def random_pairs(count: int, seed: int) -> dict:
-    """Return groups of so many pairs, from spur to 45 degrees of helix."""
+    """Return groups of ``count`` random pairs, with base helix angles from 0 to 45 degrees."""
     draw = np.random.default_rng(seed).uniform
     ratio = {name: draw(0.3, 1.5, count) for name in ("mass_ratio_p", "mass_ratio_g")}
     bearings = {
@@ -163,7 +163,7 @@ def test_random_pairs_move_as_with_fine_runge_kutta_steps(count, physical):
     how = {"periods": 4, "physical": physical}
     exact = run(model, steps=STEPS, **how, resolved=FLOW_MAP)
     fine, finer = (run(model, steps=n, **how, resolved=True) for n in (800, 1600))
-    # Richardson: what halving the step changes is 15 times the error that is left, or more.
+    # Richardson: halving the step changes the result by at least 15 times the remaining error.
     left = np.abs(finer.section - fine.section).max(axis=(1, 2)) / 15.0
     apart = np.abs(finer.section - exact.section).max(axis=(1, 2))
     assert (apart < 2.0 * left + 1e-11).all()

@@ -1,14 +1,15 @@
-"""Crossings between ends of a step that show nothing of them are found, by the margins of cubics.
+"""Margins of cubics find crossings that the ends of a step do not show.
 
-A spur pair without damping or varying stiffness, at the back flank. Between the flanks the distance
-u from it follows, with theta = Omega tau, a = E Omega^2 and load = -2 a / pi,
+The example is a spur pair at the back flank, without damping or varying stiffness. Between the
+flanks, the distance u from the back flank follows these equations, with theta = Omega tau,
+a = E Omega^2 and load = -2 a / pi:
 
     u'' = load + a sin(theta),    u = u_0 + rise theta / pi + E g(theta),
 
     g = theta - sin(theta) - theta^2 / pi.
 
-g and its slope are 0 at theta = 0 and pi, and g is -0.21 in the middle: over a step of half a
-period a cubic sees a straight line where the gap meets the flank and leaves it again.
+g and its slope are 0 at theta = 0 and pi, and g is -0.21 in the middle. Over a step of half a
+period the cubic is therefore a straight line, but the gap meets the flank and leaves it again.
 """
 
 import numpy as np
@@ -30,12 +31,12 @@ SPUR = pan2021(
     **PARALLEL,
 )
 RISE = np.linspace(0.15, 0.4, LANES)
-"""By how much the straight line rises, in parts of E: less than it takes to pass the flank by."""
+"""Rise of the straight line in units of E, small enough that the gap meets the flank."""
 
 
 @pytest.mark.parametrize("distance", [1e-3, -1e-3], ids=["first", "second"])
 def test_a_crossing_that_a_cubic_does_not_see_is_found(distance):
-    """The first one of a step, and the second one after the lane has left the flank."""
+    """The first crossing of a step, and the second one of a step that starts in contact."""
     start = np.zeros((LANES, 10))
     start[:, 0] = distance - HALF_BACKLASH
     start[:, 1] = RISE * OMEGA / np.pi
@@ -44,7 +45,8 @@ def test_a_crossing_that_a_cubic_does_not_see_is_found(distance):
         for steps in (2, 64)
     )
     assert coarse.crossings.tolist() == fine.crossings.tolist()
-    # Out of contact, into it and out again, before the second half of the period leads into it.
+    # A lane that starts in contact leaves the flank. Every lane then meets the flank and leaves it,
+    # and meets it again in the second half of the period.
     assert (fine.crossings >= (3 if distance > 0.0 else 4)).all()
     assert coarse.section == pytest.approx(fine.section, rel=0, abs=1e-11)
     assert coarse.growth == pytest.approx(fine.growth, rel=0, abs=1e-9)
@@ -53,9 +55,10 @@ def test_a_crossing_that_a_cubic_does_not_see_is_found(distance):
 @pytest.mark.parametrize("power", range(4, TERMS))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_lowered_cubic_lies_below_each_power_of_a_step(power, sign):
-    """Its middle Bezier points are lowered; a piece of the step has the fourth power of its share.
+    """A margin lowers both middle Bezier points of a cubic.
 
-    Of the fourth power of s, lowered by 1, the points lie as low as they have to.
+    For a piece of a step, the margin is smaller by the fourth power of the piece's share. For -s^4,
+    it is exactly as large as necessary.
     """
     for left, right in ((-1.0, 1.0), (-1.0, -0.4), (-0.3, 0.5), (0.6, 1.0)):
         width, t = right - left, np.linspace(0.0, 1.0, 201)

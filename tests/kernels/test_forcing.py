@@ -1,4 +1,4 @@
-"""What acts on a lane, on the grid of half steps and between its points, against trigonometry."""
+"""Forcing of a lane, on the grid of half steps and between its points, against trigonometry."""
 
 import math
 
@@ -22,7 +22,7 @@ FRACTIONS = np.concatenate([[0.0, 0.25, 0.5, 0.75, 1.0], np.linspace(0.0, 1.0, 3
 
 
 def series(harmonics: int) -> list[tuple[float, ...]]:
-    """Return coefficients that fall off no faster than those of a wave with jumps."""
+    """Return coefficients that decay as slowly as those of a wave with jumps."""
     rng = np.random.default_rng(harmonics)
     order = np.arange(1, harmonics + 1)
     return [tuple(rng.uniform(-1.0, 1.0, harmonics) / order) for _ in range(2)]
@@ -43,7 +43,7 @@ def some_steps(steps: int) -> list[int]:
 def test_the_mesh_phase_within_a_step_is_that_of_the_trigonometric_functions(steps, harmonics):
     cosine, sine = series(harmonics)
     table = phase_table(cosine, sine, steps)
-    # Rounding of the phase angle itself, of up to 2 pi, counts once for each harmonic.
+    # The rounding error of the phase angle, up to 2 pi, is multiplied by the order of a harmonic.
     size = 1.0 + np.sum(np.arange(1, harmonics + 1) * np.hypot(cosine, sine))
     for number in some_steps(steps):
         for fraction in FRACTIONS:
@@ -71,7 +71,7 @@ def test_the_last_row_is_the_first_bit_for_bit():
 
 ALL, NOTHING = scene_with(True), scene_with(None)
 EVERYTHING = scene_with(True, undamped=None)
-"""With the sine of eq. 14: what teeth have of their own does not drive delta_5."""
+"""Scene with the sine of eq. 14; errors of teeth (``undamped``) do not drive delta_5."""
 
 
 def lane(**values: float) -> Lane:

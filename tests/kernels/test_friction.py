@@ -1,4 +1,4 @@
-"""Friction between the teeth: it dissipates, and steps lose nothing where its sign changes."""
+"""Friction between the teeth dissipates, and steps keep their order where its sign changes."""
 
 from itertools import pairwise
 
@@ -17,14 +17,14 @@ from .twin import Twin
 PERIODS = 3
 LINEAR_FRICTION = TORSION._replace(friction=True)
 PHASE = np.array([0.0, 0.7, np.pi / 2.0, 3.3, -0.4])
-"""Of the pitch point: on the grid of steps in the first and in the third lane."""
+"""Phase of the pitch point; in lane 0, and in lane 2 with 4 n steps, it is on the grid of steps."""
 
 MODEL = pan2021(
     5.86,
     damping_ratio=0.04,
     friction_coefficient=0.3,
     pitch_point_phase=PHASE,
-    # Bearings no stiffer than the mesh: else their free oscillation is most of the error.
+    # The bearings are soft, because the free oscillation on stiff ones would dominate the error.
     transverse_stiffness_p=2.0,
     transverse_stiffness_g=1.0,
     axial_stiffness_p=1.5,
@@ -34,17 +34,17 @@ START = state(delta_5=2.0, delta_5_rate=0.1)
 
 
 def follow(steps: int) -> Outcome:
-    """Integrate torsion with all records that depend on every step."""
+    """Integrate the torsional scene with all records that depend on every step."""
     plan = Plan(steps, 0, PERIODS, PERIODS, tangent=True, loads=True, history_periods=PERIODS)
     system = system_of(MODEL, LINEAR_FRICTION)
     return integrate(system, np.tile(START[:2], (PHASE.size, 1)), plan)
 
 
 def exact_flow(number: int, begin: float, end: float) -> np.ndarray:
-    """Return the map of (state, 1) between two mesh phases in periods, and integrals of N_y.
+    """Return the map of (state, 1, integral of N_y) between two mesh phases, in periods.
 
-    On either side of the pitch point delta_5'' = f_n - (1 - s mu lambda) cos(beta_b) N_y with N_y =
-    delta_5 + 2 xi delta_5' is linear with constant coefficients. The last row is that integral.
+    On each side of the pitch point delta_5'' = f_n - (1 - s mu lambda) cos(beta_b) N_y, with N_y =
+    delta_5 + 2 xi delta_5', is linear with constant coefficients.
     """
     groups = lane(MODEL, number)
     period, pitch_point = 2.0 * np.pi / groups.mesh_frequency, groups.pitch_point_phase
@@ -103,8 +103,8 @@ def test_the_mean_mesh_force_is_that_of_the_exact_motion():
     period, start = 2.0 * np.pi / MODEL.mesh_frequency[0], np.array([*START[:2], 1.0, 0.0])
     wanted = [(exact_flow(n, 0.0, PERIODS) @ start)[3] / (PERIODS * period) for n in range(5)]
     errors = [np.abs(follow(int(steps)).loads[:, 0, 2] - wanted) for steps in STEPS]
-    # In a step with a change of the sign the loads take the state in its middle from the cubic
-    # through both ends, so that the damper's share is right to order 3 only.
+    # In a step with a change of the sign, loads take the state in the middle from the cubic through
+    # both ends. The force of the damper is therefore accurate to order 3 only.
     assert measured_order(np.mean(errors, axis=1)) > 2.7
     assert measured_order([of_lanes[0] for of_lanes in errors]) > 3.7
 
@@ -129,7 +129,7 @@ def test_a_lane_switches_at_its_own_phase_whatever_its_neighbours_do():
 
 @pytest.mark.parametrize("physical", [False, True])
 def test_motions_with_crossings_converge_with_order_four(physical):
-    # Where in its step a crossing falls changes the error, but not its order.
+    # The place of a crossing within its step changes the error, but not its order.
     steps = np.array([200, 240, 283, 340, 400, 480, 566, 680, 800])
     exact = [
         Exact(lane(MODEL, number), FRICTION, physical, None, PERIODS).follow(START, PERIODS)
@@ -151,7 +151,7 @@ def test_motions_with_crossings_converge_with_order_four(physical):
 
 
 def test_steps_that_cross_and_change_the_sign_keep_the_order():
-    # With so many phases some lanes cross a flank in a step in which the sign changes.
+    # With 192 phases, some lanes cross a flank in a step in which the sign changes.
     phases = np.linspace(0.0, 2.0 * np.pi, 192, endpoint=False)
     chosen = {name: values[0] for name, values in MODEL._asdict().items()}
     chosen["pitch_point_phase"] = phases
@@ -168,7 +168,8 @@ def test_steps_that_cross_and_change_the_sign_keep_the_order():
 
 
 def test_friction_takes_energy_from_sliding_on_both_flanks():
-    # Samples half a step beside all changes of the sign, on the driving and on the back flank.
+    # Samples on the driving and on the back flank. With 90 steps, those of lane 2 are half a step
+    # away from the changes of the sign.
     steps, flanks = 90, (1.0, -1.0)
     system = system_of(MODEL, LINEAR_FRICTION)
     for flank in flanks:
@@ -181,9 +182,9 @@ def test_friction_takes_energy_from_sliding_on_both_flanks():
         size = MODEL.friction_coefficient * MODEL.friction_lever
         assert np.abs(share) == pytest.approx(np.tile(size[:, np.newaxis], (1, 2 * steps)))
         # The moment of friction on the driving gear is share * force in units of the base radius;
-        # that of the driven gear is opposite. Beyond the pitch point by a part x of the base pitch
-        # the flank of the driving gear is the faster one. That of the back flanks, of teeth half a
-        # pitch thick, passes the pitch point half a period later.
+        # the moment on the driven gear is opposite. x is the distance of the contact beyond the
+        # pitch point, in base pitches; there the flank of the driving gear is faster. Teeth are
+        # half a pitch thick: a contact of back flanks passes the pitch point half a period later.
         turns = np.arange(2 * steps) / steps - PHASE[:, np.newaxis] / (2.0 * np.pi)
         x = (turns + (0.0 if flank > 0.0 else 0.5) + 0.5) % 1.0 - 0.5
         moved = (np.abs(x) > 1e-9) & (np.abs(x) < 0.5 - 1e-9)
@@ -194,5 +195,5 @@ def test_friction_takes_energy_from_sliding_on_both_flanks():
 def test_flow_maps_refuse_friction():
     system = system_of(MODEL, LINEAR_FRICTION)
     plan = Plan(24, 0, 1, 1, method="flow_map")
-    with pytest.raises(ValueError, match="flow maps know no friction"):
+    with pytest.raises(ValueError, match="flow maps cannot integrate friction"):
         integrate(system, np.zeros((PHASE.size, 2)), plan)

@@ -1,4 +1,4 @@
-"""Clearances, contacts and loads that break careless integrators, each with what must hold."""
+"""Clearances, contacts and loads that are hard cases for an integrator."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ BOTH = pytest.mark.parametrize(
 
 
 def constant(**groups):
-    """Return a pair on which nothing acts but load, mesh and clearance."""
+    """Return a pair on which only load, mesh and clearance act."""
     return pan2021(0.0, stiffness_variation_scale=0.0, **groups)
 
 
@@ -46,19 +46,20 @@ def test_a_tiny_clearance_is_a_perturbation_of_its_own_size(resolved):
     model = pan2021([0.5, 5.86, 12.0])
     how = {"steps": 100, "periods": 200}
     tiny = run(model._replace(half_backlash=np.full(3, 1e-9)), FULL, **how, resolved=resolved)
-    # Flow maps are exact, as short steps nearly are.
+    # Flow maps are exact. They are compared with short steps, which are nearly exact.
     none = run(model, NO_BACKLASH, **how | ({"steps": 800} if resolved == FLOW_MAP else {}))
     assert_sound(tiny)
-    # A split step is two shorter ones: what differs is the error of the method, not the clearance.
+    # A split step consists of shorter steps. The results differ by the error of the method, not by
+    # the clearance.
     assert tiny.section == pytest.approx(none.section, rel=0, abs=2e-6)
-    # Its slope is that of the free gap for no more than a step now and then.
+    # The growth differs only in the few steps in which the gap is free.
     total, wanted = (np.cumsum(outcome.growth, axis=1) for outcome in (tiny, none))
     assert total == pytest.approx(wanted, rel=0, abs=0.01)
 
 
 @BOTH
 def test_a_clearance_that_is_never_crossed_leaves_a_free_gap_with_its_damping(resolved):
-    # N_y is 2 xi y' alone: under the load the gears run away to the speed that damping allows.
+    # N_y is only 2 xi y': the load accelerates the gears to the speed that the damping permits.
     model = constant(half_backlash=1e9, load=0.3)
     outcome = run(model, TORSION_ONLY, steps=100, periods=200, resolved=resolved)
     assert_sound(outcome)
@@ -82,7 +83,7 @@ def test_a_huge_clearance_that_is_met_is_met_once_and_held(resolved):
     assert outcome.end_state[0, 0] == pytest.approx(held, rel=1e-12)
 
 
-# Contact that is grazed, lost and hit
+# Grazing, contact loss and impacts
 
 
 @pytest.mark.parametrize("excess", [-1e-3, -1e-9, 0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
@@ -105,12 +106,12 @@ def test_a_grazing_motion_is_the_motion_in_contact_as_near_as_it_grazes(resolved
     assert_sound(outcome)
     tau = 2.0 * np.pi / OMEGA * np.arange(1, periods + 1)
     wanted = middle + amplitude * np.cos(np.sqrt(COS) * tau)
-    # Off the flank for a time like the root of the excess, and by the excess: the power 3/2.
+    # The time apart grows like the root of the excess, the distance like the excess: power 3/2.
     departure = 20.0 * max(excess, 0.0) ** 1.5
     method = 1e-7 if resolved else 1e-6
     assert outcome.section[0, :, 0] == pytest.approx(wanted, rel=0, abs=departure + method)
     if resolved:
-        # In and out: once or not at all for each oscillation, and always both.
+        # In each oscillation the motion leaves the flank and returns, or stays in contact.
         assert outcome.crossings[0] % 2 == 0
         assert outcome.crossings[0] <= 2 * periods * np.sqrt(COS) / OMEGA + 2
         assert (outcome.crossings[0] > 0) == (outcome.slowest_crossing[0] < np.inf)
@@ -128,7 +129,8 @@ def test_sustained_impacts_on_both_flanks_stay_within_reach_and_alternate(resolv
     reach = 2.0 * (COS * model.half_backlash + 10.0 * model.error_amplitude)
     assert (np.abs(outcome.section[:, :, 0]).max(axis=1) < reach).all()
     if resolved:
-        # Without load nothing prefers a side: across the gap and back in every period.
+        # Without load both flanks are equivalent: the motion crosses the gap and returns in every
+        # period.
         assert (outcome.crossings == 4 * 300).all()
 
 
@@ -173,6 +175,6 @@ def test_any_pitch_error_up_to_a_hundred_multiples_gives_a_bounded_motion(resolv
     model = pan2021(multiples)
     outcome = run(model, FULL, steps=100, transient=100, periods=200, resolved=resolved)
     assert_sound(outcome)
-    # The response of the pair is far from ten times its resonance at rest.
+    # A generous bound: the pair amplifies load and error by much less than 10.
     reach = model.half_backlash + 10.0 * (model.load + model.error_amplitude)
     assert (np.abs(outcome.section).max(axis=(1, 2)) < 3.0 * reach).all()

@@ -1,4 +1,4 @@
-"""Bearings, frequencies, damping and starts at the ends of their ranges: what must hold there."""
+"""Bearings, frequencies, damping and starts at the ends of their ranges."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ from .test_order import measured_order
 
 
 def test_stiff_bearings_approach_rigid_ones_like_the_inverse_of_their_stiffness():
-    # The stiffest mode has a hundred radians in a unit of time: 7 units a period, 1000 steps.
+    # The stiffest mode has 100 radians per unit of time. A period has 7 units and 1000 steps.
     stiffness = np.array([1e2, 1e3, 1e4])
     model = pan2021(
         np.full(3, 5.86),
@@ -74,7 +74,8 @@ def test_bearings_soft_as_none_give_the_motion_of_a_free_pair(resolved):
     how = {"steps": 200, "periods": 20, "resolved": resolved}
     soft, none = run(free(1e-6), FULL, **how), run(free(0.0), FULL, **how)
     assert_sound(soft)
-    # A bearing of 1e-6 acts by 1e-6 tau^2/2 = 0.01 of its displacement in 20 periods.
+    # In 20 periods a bearing of stiffness 1e-6 moves a gear by 1e-6 tau^2/2 = 0.01 of its
+    # displacement.
     reach = np.abs(none.section).max()
     assert soft.section == pytest.approx(none.section, rel=0, abs=0.02 * reach)
     assert np.abs(soft.section - none.section).max() > 0.0
@@ -98,9 +99,9 @@ def test_the_analytic_response_repeats_at_every_mesh_frequency(frequency, steps)
 @pytest.mark.parametrize("frequency", [0.01, 0.05, 0.2, 1.0, 5.0, 10.0])
 @BOTH
 def test_every_mesh_frequency_gives_a_finite_motion(resolved, frequency):
-    # 6 rad per unit of time is the fastest mode: half a radian a step.
+    # The fastest mode has 6 radians per unit of time, which is half a radian per step.
     steps = max(50, int(np.ceil(12.0 * 2.0 * np.pi / frequency)))
-    # Flow maps find out by themselves how many they need.
+    # Flow maps choose the number of steps that they need.
     steps = 24 if resolved == FLOW_MAP else steps
     model = pan2021(np.linspace(0.0, 15.0, 32), mesh_frequency=frequency)
     start = state(delta_5=1.2)
@@ -133,7 +134,7 @@ def test_a_tangent_vector_stays_in_range_over_long_periods_and_gives_the_exponen
 
 @pytest.fixture
 def scaled_every(monkeypatch):
-    """Set after how many steps every tangent vector is scaled."""
+    """Return a function that sets the number of steps between scalings of tangent vectors."""
 
     def set_interval(steps: int) -> None:
         monkeypatch.setattr(
@@ -160,7 +161,7 @@ def test_the_growth_does_not_depend_on_how_often_the_tangent_vector_is_scaled(
 
 @pytest.mark.parametrize("ratio", [2.0, -0.5], ids=["vanishes", "overflows"])
 def test_a_tangent_vector_that_leaves_the_range_of_numbers_is_reported(ratio, scaled_every):
-    # One period is far too long for it, and the kernels know: they scale it more often.
+    # The vector leaves the range within one period. The kernels therefore scale it more often.
     model = pan2021(0.0, load=0.0, mesh_frequency=0.001, damping_ratio=ratio)
     how = {"steps": 20_000, "periods": 2}
     assert steps_between_scalings(system_of(model, TORSION), 20_000)[0] < 5000

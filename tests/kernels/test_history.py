@@ -1,4 +1,4 @@
-"""The state at every step of the last periods: what the sections and the end state are part of."""
+"""The state at every step of the last periods, which contains sections and the end state."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_keeping_the_history_changes_nothing_else(outcome):
 
 
 def test_between_two_steps_displacements_follow_the_rates(outcome):
-    """The trapezoidal rule over one step: what a wrong order of the samples would break."""
+    """The trapezoidal rule holds over each step; a wrong order of the samples would violate it."""
     step = 2.0 * np.pi / OMEGA / STEPS
     moved = np.diff(outcome.history[:, :, 0::2], axis=1)
     rates = outcome.history[:, :, 1::2]

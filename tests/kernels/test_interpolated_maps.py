@@ -20,7 +20,7 @@ def with_frequencies(frequencies):
 
 
 def pairs(frequencies):
-    """Return pairs that differ in their mesh frequency, and the number of that parameter."""
+    """Return pairs that differ in their mesh frequency, and the index of this parameter."""
     (along,) = np.flatnonzero(np.ptp(with_frequencies([0.8, 1.2]).map_parameters(), axis=0))
     return with_frequencies(frequencies), int(along)
 
@@ -31,7 +31,7 @@ def starts(system):
 
 @pytest.fixture
 def made(monkeypatch):
-    """Return the pieces that are made in a test, which begins without any pieces and maps."""
+    """Return the pieces that a test makes; the test begins without any pieces and maps."""
     pieces = {}
     monkeypatch.setattr(interpolation, "_pieces", pieces)
     monkeypatch.setattr(store, "_kept", store._Kept(0))
@@ -69,7 +69,7 @@ def test_a_frequency_at_a_node_has_the_maps_of_the_node(made):
 
 
 def test_a_piece_whose_maps_are_not_accurate_is_divided_or_refused(made, monkeypatch):
-    # Rounding alone exceeds this.
+    # Rounding errors exceed this limit.
     monkeypatch.setattr(interpolation, "ACCURACY", ACCURACY * 1e-6)
     system, along = pairs([0.8, 1.1])
     exact = integrate(system, starts(system), PLAN)

@@ -1,4 +1,4 @@
-"""What a piecewise linear system owes to its form: scaling and symmetry, bit for bit."""
+"""Scaling and symmetry of piecewise-linear systems, bit for bit."""
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ HOW = {"steps": 144, "transient": 5, "periods": 20}
 
 @pytest.fixture(scope="module", params=[False, True], ids=["plain", "resolved"])
 def how(request):
-    """Plain steps, or such as are split where they cross the clearance."""
+    """Plain steps or resolved steps."""
     return {**HOW, "resolved": request.param}
 
 
 @pytest.fixture(scope="module")
 def scaled(how):
-    """Integrate with every length of the model multiplied by one factor."""
+    """Return a function that integrates with all lengths of the model multiplied by a factor."""
 
     def integrate(factor: float, start_factor: float | None = None):
         lengths = {name: factor * getattr(MODEL, name) for name in LENGTHS}
@@ -46,7 +46,7 @@ def test_scaling_all_lengths_by_a_power_of_two_scales_every_bit(scaled, original
 
 def test_scaling_all_lengths_by_ten_scales_the_motion_to_rounding(scaled, original):
     outcome = scaled(10.0)
-    # Rounding grows along the chaotic lane, by e^(0.1 tau) at most.
+    # Rounding errors grow along the chaotic lane, by e^(0.1 tau) at most.
     assert outcome.section[:, :5] == pytest.approx(10.0 * original.section[:, :5], abs=1e-10)
     regular = slice(0, 2)
     assert outcome.section[regular] == pytest.approx(10.0 * original.section[regular], abs=1e-10)
@@ -79,7 +79,7 @@ def test_a_full_turn_of_phase_changes_nothing():
 
 
 def test_half_of_every_frequency_is_the_same_motion_at_half_the_rates(how):
-    # The mesh stiffness is the unit of time, so this needs a scene whose mesh carries nothing.
+    # The mesh stiffness defines the unit of time, so the mesh must transmit no force here.
     nothing = np.zeros(4)
     free = MODEL._replace(half_backlash=np.full(4, 1e9), damping_ratio=nothing, load=nothing)
     slower = {

@@ -20,7 +20,7 @@ from .reference import (
 
 MODEL = pan2021(5.86, error_mean=0.1, error_phase=0.4, stiffness_variation_scale=0.0)
 TORQUE = state(delta_5_rate=1.0)
-"""What a unit of load accelerates."""
+"""Accelerations by a unit load."""
 
 
 def one(model: Groups, name: str) -> float:
@@ -30,8 +30,8 @@ def one(model: Groups, name: str) -> float:
 def system(model: Groups) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return A and the columns B_y, B_z of x' = A x + B_y n_y + B_z n_z + load.
 
-    x holds the states in the order of `STATES`; n_y and n_z are what the pitch error
-    adds to the mesh forces of eq. 13.
+    x contains the states in the order of `STATES`; n_y and n_z are the parts of the mesh forces of
+    eq. 13 that the pitch error adds.
     """
     beta = one(model, "base_helix_angle")
     mu_p, mu_g = one(model, "mass_ratio_p"), one(model, "mass_ratio_g")
@@ -51,7 +51,7 @@ def system(model: Groups) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def response(model: Groups, physical: bool, frequency: float) -> np.ndarray:
-    """Return the phasor of the states for a pitch error of amplitude 1 and any frequency."""
+    """Return the phasor of the states for a pitch error of amplitude 1 at one frequency."""
     matrix, row_y, row_z = system(model)
     beta = one(model, "base_helix_angle")
     if physical:
@@ -64,7 +64,7 @@ def response(model: Groups, physical: bool, frequency: float) -> np.ndarray:
 
 
 def resting_state(model: Groups, physical: bool) -> np.ndarray:
-    """Return the state under the load and the mean of the pitch error alone."""
+    """Return the static state under the load and the mean of the pitch error."""
     loaded = -np.linalg.solve(system(model)[0], one(model, "load") * TORQUE)
     return loaded + one(model, "error_mean") * response(model, physical, 0.0).real
 
@@ -111,7 +111,7 @@ def test_analytic_response_repeats_every_period(physical):
     ],
 )
 def test_exponent_of_linear_scene_is_largest_real_part_of_eigenvalues(changes):
-    # At rest without load or error: an unstable scene does not run away either.
+    # Without load and error the state stays at rest, even in an unstable scene.
     model = pan2021(0.0, load=0.0, **changes)
     largest = np.max(np.linalg.eigvals(system(model)[0]).real)
     found = exponent_of(model, LINEAR, steps=200, transient=1200, periods=600)

@@ -27,9 +27,9 @@ from .reference import assert_same_bits, lanes_out_of
 
 
 def mean_order(coarse, fine):
-    """Return the mean order of those errors that are not yet rounding, with a quarter of the step.
+    """Return the mean order from a step to its quarter, of the errors above rounding.
 
-    A machine that nearly grazes reaches the order of the method later than the others.
+    The order is a mean, because machines that nearly graze need smaller steps to reach order 4.
     """
     resolved = coarse > 1e-10
     return np.log2(coarse[resolved] / fine[resolved]).mean() / 2
@@ -56,7 +56,7 @@ def test_the_jacobian_is_that_of_the_matrices(compiled, monkeypatch):
     machines = [random_machine(seed, 3, 2) for seed in range(4)]
     system = lanes_of(machines)
     if compiled:
-        # Of other models the compiled formulas are evaluated.
+        # Evaluate the compiled formulas, as for other models.
         monkeypatch.setattr(LinearSystems, "branch_jacobian", LaneSystem.branch_jacobian)
     apart = np.zeros((4, 2))
     for share in (apart, apart + 1.0):
@@ -149,7 +149,7 @@ def test_the_state_in_contact_is_on_the_flank_that_carries_the_load(load):
 @given(
     size=st.sampled_from([one[:2] for one in SIZES_OF_MAPS]),
     seed=st.integers(100, 10_000),
-    # Not 0: the compiled loops leave out what is zero in all lanes.
+    # Not 0: terms that are zero in all lanes are left out, which would need another loop.
     held=st.sampled_from([1.0, 0.01, -0.05]),
     step=st.sampled_from([24, 60]),
 )
@@ -179,8 +179,8 @@ def test_flow_maps_record_the_loads_of_fine_steps_where_dampers_act_in_contact(s
     found = integrate(system, start, Plan(60, **WITH_LOADS, method="flow_map")).loads
     size = np.abs(wanted[..., :2]).max(axis=2)
     error, double = (np.abs(found - one)[..., :2].max(axis=2) / size for one in (wanted, coarse))
-    # A force may be largest where it jumps. Fine steps see it at their ends only: an error that
-    # falls with the step, whereas other extremes have order 4.
+    # A force may be largest where it jumps. Fine steps sample it at their ends only. This error is
+    # proportional to the step, whereas other extremes have order 4.
     at_jumps = error > 1e-8
     assert (at_jumps.sum(axis=1) <= 1).all()
     assert (error[at_jumps] <= 5e-5).all()
@@ -188,7 +188,7 @@ def test_flow_maps_record_the_loads_of_fine_steps_where_dampers_act_in_contact(s
     halved = Plan(120, **WITH_LOADS, method="flow_map")
     extremes = integrate(system, start, halved).loads[..., :2]
     assert (np.abs(found[..., :2] - extremes).max(axis=2) <= 1e-11 * size).all()
-    # The same error of the fine steps.
+    # Means and mean squares contain the same error of the fine steps.
     assert (np.abs(found[..., 2] - wanted[..., 2]) <= 1e-5 * size).all()
     assert (np.abs(found[..., 3] - wanted[..., 3]) <= 1e-5 * size**2).all()
 
@@ -197,7 +197,7 @@ def test_flow_maps_record_the_loads_of_fine_steps_where_dampers_act_in_contact(s
 def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(size):
     machines, start, _, _, _ = exact(*size)
     plan = Plan(60, **WITH_LOADS, method="flow_map")
-    # The same maps for many lanes, which move eight at a time, and for one.
+    # All lanes have the same maps. Many lanes move eight at a time, a single lane moves alone.
     system = lanes_of(machines[:1] * 9)
     starts = start[0] * np.linspace(0.5, 1.0, 9)[:, np.newaxis]
     together = integrate(system, starts, plan)
@@ -208,7 +208,7 @@ def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(size):
         assert np.array_equal(alone.loads[0], together.loads[lane])
 
 
-# Maps made in advance, and maps made on demand.
+# The first size has maps made in advance, the second one maps made on demand.
 @pytest.mark.parametrize("size", SIZES_OF_MAPS[1:], ids=str)
 def test_maps_of_scenes_with_loads_and_without_are_kept_apart(size, monkeypatch):
     machines, start, _, _, _ = exact(*size)
@@ -237,14 +237,14 @@ def test_flow_maps_refuse_more_elements_than_a_number_can_list():
 
 @pytest.fixture(scope="module")
 def crowd():
-    """Lanes of machines with six elements, many with the same maps, their plan and outcome."""
+    """Lanes of machines with six elements, many with the same maps; start, plan and outcome."""
     machines = [random_machine(seed, 5, 6) for seed in range(3)]
     system = lanes_of([machines[n % 3] for n in range(108)])
-    # Machine 2 has two lanes only, the others more than a block of them.
+    # Machine 2 has only two lanes, the others have more lanes than a block.
     system = system.of([n for n in range(108) if n % 3 < 2 or n < 6])
     start = 0.5 * np.random.default_rng(3).normal(size=(system.lanes, 10))
     start[5] = np.nan
-    # So few steps are doubled, for each lane as often as it needs.
+    # 3 steps are too few. The number is doubled for each lane as often as necessary.
     plan = Plan(3, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
     return system, start, plan, integrate(system, start, plan)
 

@@ -1,4 +1,4 @@
-"""Mesh forces and transmission error of a record, against analytic motions and finer ones."""
+"""Mesh forces and transmission error of a record, against analytic motions and fine steps."""
 
 import numpy as np
 import pytest
@@ -9,10 +9,10 @@ from .reference import FLOW_MAP, assert_same_bits, pan2021, state, swinging, sys
 FORCE, AXIAL, ERROR = range(3)
 LARGEST, SMALLEST, MEAN, SQUARE = range(4)
 MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
-"""Held, and on the driving flank once a period."""
+"""Lane 0 is held, the others meet the driving flank once per period."""
 PLAN = Plan(200, 60, 12, 1, tangent=True, contact=True, loads=True)
 PLAIN = PLAN._replace(resolved=False, contact=False, states=("delta_5",))
-"""With extremes of a state, as other tests have compiled this loop."""
+"""Extremes of a state are recorded, because other tests have compiled this loop."""
 
 
 def test_teeth_at_rest_carry_the_static_load():
@@ -27,7 +27,7 @@ def test_teeth_at_rest_carry_the_static_load():
     for number in (LARGEST, SMALLEST, MEAN):
         assert loads[:, FORCE, number] == pytest.approx(static, rel=1e-9)
     assert loads[:, FORCE, SQUARE] == pytest.approx(static**2, rel=1e-9)
-    # Nothing but the deflection of the teeth and of the bearings, and half the backlash.
+    # The transmission error is constant: half the backlash and the static deflections.
     assert np.ptp(loads[:, ERROR, :3], axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -36,7 +36,7 @@ def test_a_swinging_mass_carries_its_own_inertia():
     system, _ = swinging()
     plan = PLAIN._replace(transient_periods=0, recorded_periods=periods)
     (loads,) = integrate(system, state(delta_5=amplitude)[np.newaxis], plan).loads
-    # Of a step of h radians the parabola's height is wrong by less than (h / 2)^3.
+    # For a step of h radians, the error of the parabola's height is less than (h / 2)^3.
     assert loads[FORCE, [LARGEST, SMALLEST]] == pytest.approx([amplitude, -amplitude], rel=4e-6)
     assert loads[FORCE, SQUARE] == pytest.approx(amplitude**2 / 2.0, rel=1e-7)
     assert loads[ERROR, [LARGEST, SMALLEST]] == pytest.approx([amplitude, -amplitude], rel=4e-6)
@@ -65,7 +65,8 @@ def test_loads_are_those_of_the_motion_at_sixteen_times_the_steps():
 
 
 def test_a_kink_is_not_missed():
-    # Teeth part where the force, then all damping, is smallest: only the crossing itself shows it.
+    # The force has its minimum where the teeth part, and is then the damping force alone. Only the
+    # crossing itself shows this minimum.
     system, start = system_of(MODEL), np.zeros((4, 10))
     loads = integrate(system, start, PLAN).loads
     fine = integrate(system, start, PLAN._replace(steps_per_period=3200)).loads
@@ -89,7 +90,7 @@ def test_flow_maps_follow_a_swinging_mass_at_any_phase_of_their_steps():
     amplitude, periods = 0.7, 8
     system, rate = swinging()
     plan = Plan(12, 0, periods, 1, tangent=True, loads=True, method=FLOW_MAP)
-    # The crest of a cosine lies within a step, wherever the motion starts.
+    # For different phases the crest of the cosine lies at different places within a step.
     for phase in (0.0, 0.1, 1.0):
         start = state(
             delta_5=amplitude * np.cos(phase), delta_5_rate=-amplitude * rate * np.sin(phase)
@@ -97,7 +98,7 @@ def test_flow_maps_follow_a_swinging_mass_at_any_phase_of_their_steps():
         (loads,) = integrate(system, start, plan).loads
         for signal in (FORCE, ERROR):
             extremes = loads[signal, [LARGEST, SMALLEST]]
-            # The bearings move by a billionth of it.
+            # The bearings move by a billionth of the amplitude.
             assert extremes == pytest.approx([amplitude, -amplitude], rel=2e-9)
             assert loads[signal, SQUARE] == pytest.approx(amplitude**2 / 2.0, rel=4e-9)
             assert loads[signal, MEAN] == pytest.approx(0.0, abs=2e-9)
@@ -108,7 +109,7 @@ def test_flow_maps_record_the_loads_of_very_fine_steps():
     wanted = integrate(system, start, PLAN._replace(steps_per_period=12800)).loads
     exact = integrate(system, start, PLAN._replace(steps_per_period=12, method=FLOW_MAP)).loads
     size = np.abs(wanted[..., :2]).max(axis=2)
-    # The fine steps themselves are right to 2e-11, and their means at kinks to 3e-10.
+    # The fine steps are accurate to 2e-11, and their means at kinks to 3e-10.
     assert np.abs(exact[..., :2] - wanted[..., :2]).max(axis=2) == pytest.approx(0.0, abs=1e-10)
     assert (np.abs(exact[..., MEAN] - wanted[..., MEAN]) <= 1e-9 * size).all()
     assert exact[..., SQUARE] == pytest.approx(wanted[..., SQUARE], rel=1e-9)
@@ -117,11 +118,12 @@ def test_flow_maps_record_the_loads_of_very_fine_steps():
 def test_flow_maps_sample_states_as_well_as_200_runge_kutta_steps():
     system, start = system_of(MODEL), np.zeros((4, 10))
     fine = integrate(system, start, PLAN._replace(steps_per_period=3200))
-    # With extremes of a state: other tests have compiled this loop.
+    # Extremes of a state are recorded, because other tests have compiled this loop.
     plan = PLAN._replace(steps_per_period=24, method=FLOW_MAP, section_points=72)
     exact = integrate(system, start, plan._replace(states=("delta_5",)))
     wanted = fine.loads
-    # All that two hundred Runge-Kutta steps have is 4e-6, 7e-6 and, of mean squares, 9e-7.
+    # The errors of 200 Runge-Kutta steps are 4e-6 for extremes, 7e-6 for means and 9e-7 for mean
+    # squares.
     size = np.abs(wanted[..., :2]).max(axis=2)
     extremes = np.abs(exact.loads[..., :2] - wanted[..., :2]).max(axis=2)
     assert (extremes <= 1e-6 * size).all()

@@ -1,10 +1,10 @@
-"""Stored solutions of Pan 2021: every run and every periodic orbit, within what the step gives.
+"""Runs and periodic orbits of Pan 2021 against stored solutions, within the error of the step.
 
-How far a run may be from the stored solution is told by the runs themselves (Richardson): where the
-order is 4, halving the step takes 15/16 of the error away, so that 16/15 of what halving changes is
-the error. The next term of the error, of relative size c, spoils this estimate by c/30, and makes
-the next halving change less by another factor than 16: by one that misses 16 by the share 0.52 c.
-What is found to be missed is therefore the tolerance of the estimate, and more than sufficient.
+The allowed distance from a stored solution follows from the runs themselves (Richardson). At order
+4, halving the step removes 15/16 of the error, so the error is 16/15 of the change. The next term
+of the error, of relative size c, makes this estimate wrong by c/30. It also makes the ratio of two
+successive changes differ from 16 by the share 0.52 c. This measured difference is used as the
+tolerance of the estimate; it is more than sufficient.
 """
 
 import functools
@@ -33,10 +33,10 @@ from .test_order import measured_order
 RUNS = SOLUTIONS["runs"]
 ORBITS = SOLUTIONS["periodic_orbits"]
 DEFAULT = 200
-"""Steps a period where nobody asks for others."""
+"""Steps per period, unless a test sets others."""
 
 EXACT = 1e-10
-"""What the stored solutions themselves are believed to."""
+"""Assumed accuracy of the stored solutions."""
 
 
 def scene_of(solution: dict) -> Effects:
@@ -48,7 +48,7 @@ def scene_of(solution: dict) -> Effects:
 
 
 def pair_of(solution: dict) -> Groups:
-    """Return the pair of a solution; what is constant need not be absent, and compiled apart."""
+    """Return the pair of a solution; absent effects get zero size, to compile fewer scenes."""
     absent = {
         "constant_stiffness": {"stiffness_variation_scale": 0.0},
         "no_pitch_error": {"error_amplitude": 0.0},
@@ -68,7 +68,7 @@ def stored(solutions: list[dict]) -> pytest.MarkDecorator:
 
 
 def follow(solution: dict, steps: int, model: Groups | None = None, **how) -> Outcome:
-    """Integrate from the start of a run or an orbit, to its end or twice around."""
+    """Integrate a run from its start to its end, or an orbit over two of its periods."""
     orbit = "section_points" in solution
     how = {"periods": 2 * solution["period"] if orbit else solution["periods"][-1], **how}
     return run(
@@ -83,12 +83,12 @@ def follow(solution: dict, steps: int, model: Groups | None = None, **how) -> Ou
 
 @functools.cache
 def followed(number: int, steps: int) -> Outcome:
-    """Return a run or an orbit followed with split steps."""
+    """Return a run or an orbit, integrated with resolved steps."""
     return follow((RUNS + ORBITS)[number], steps)
 
 
 def states(solution: dict, outcome: Outcome) -> np.ndarray:
-    """Return the states of an outcome that the solution has stored."""
+    """Return the states of an outcome at the periods that the solution has stored."""
     if "section_points" in solution:
         return outcome.section[0]
     return outcome.section[0, np.array(solution["periods"]) - 1]
@@ -97,7 +97,7 @@ def states(solution: dict, outcome: Outcome) -> np.ndarray:
 def wanted(solution: dict) -> np.ndarray:
     """Return the stored states, in the order of the scene's states."""
     if "section_points" in solution:
-        # An orbit comes to its next section point, and to the first one after the last.
+        # Each period leads an orbit to its next section point, and from the last one to the first.
         points = solution["section_points"]
         values = 2 * [*points[1:], points[0]]
     else:
@@ -106,7 +106,7 @@ def wanted(solution: dict) -> np.ndarray:
 
 
 class Predicted(NamedTuple):
-    """Error that a step and its half and quarter predict, and how far they are from order 4."""
+    """Error predicted from a step, its half and its quarter, and their deviation from order 4."""
 
     error: float
     missed: float
@@ -131,14 +131,14 @@ def error(solution: dict, outcome: Outcome) -> float:
 def test_the_default_is_as_far_from_the_stored_solution_as_its_step_predicts(number):
     solution = (RUNS + ORBITS)[number]
     found, missed = prediction(number, DEFAULT)
-    # A rate of convergence nearer to 16 than to those of the orders 3 and 5, 8 and 32.
+    # The rate of convergence is nearer to 16 than to 8 or 32, the rates of orders 3 and 5.
     assert missed < 0.25
     distance = error(solution, followed(number, DEFAULT))
     assert distance == pytest.approx(found, rel=missed, abs=EXACT)
 
 
 GRIDS = np.array([200, 238, 283, 336, 400, 476, 566, 673, 800])
-"""From the default to a quarter of its step, by fourth roots of 2."""
+"""Steps per period, from the default to four times as many, by factors of 2^(1/4)."""
 
 
 @stored(RUNS + ORBITS)
@@ -146,16 +146,17 @@ def test_states_converge_with_order_four_whatever_is_crossed(number):
     solution = (RUNS + ORBITS)[number]
     errors = [error(solution, followed(number, int(steps))) for steps in GRIDS]
     between = np.diff(np.log(errors)) / -np.diff(np.log(GRIDS))
-    # An error A h^4 (1 + c h) bends the line: from one grid to the next its slope goes from
-    # 4 + 0.92 c to 4 + 0.27 c, with h = 1 at the default, and that of all is 4 + 0.53 c. What it is
-    # off is thus less than the slopes spread; where crossings fall in their steps adds to that.
+    # An error A h^4 (1 + c h), with h = 1 at the default, bends the line: its slope between
+    # neighbouring grids varies from 4 + 0.92 c to 4 + 0.27 c, and the slope over all grids is
+    # 4 + 0.53 c. The deviation from 4 is therefore less than the spread of the slopes. The places
+    # of crossings within their steps increase the spread.
     assert measured_order(errors, GRIDS) == pytest.approx(4.0, rel=0, abs=np.ptp(between))
     assert np.ptp(between) < 0.5
 
 
 @stored([solution for solution in RUNS + ORBITS if scene_of(solution).backlash])
 def test_the_clearance_is_crossed_as_often_as_in_the_stored_solution(number):
-    # The stored runs were restarted at every crossing of either clearance, over all their periods.
+    # The stored runs were restarted at every crossing of both clearances, in all periods.
     solution = (RUNS + ORBITS)[number]
     turns = 2 if "section_points" in solution else 1
     for steps in GRIDS:
@@ -173,18 +174,18 @@ def test_plain_steps_predict_their_error_where_nothing_is_crossed(number):
     assert error(solution, outcomes[0]) == pytest.approx(found, rel=missed, abs=EXACT)
 
 
-# Groups that act on a run, with the share of their value by which the run below must notice them:
-# the damping of the bearings hardly acts.
+# Relative error of each group that the run below must detect. It is larger for the damping of the
+# bearings, which has little effect.
 WRONG_BY = {
     name: 0.1 if "axial_damping" in name or "transverse_damping" in name else 1e-3
     for name in Groups._fields
-    # The reference solutions have neither a mean error, a phase nor friction.
+    # The reference solutions have no mean error, no phase and no friction.
     if name not in ("error_mean", "error_phase", "pitch_point_phase") and "friction" not in name
 }
 
 
 def distance_of_wrong(name: str, group: str, share: float, steps: int) -> float:
-    """Return the distance of a run with a wrong group, in errors that its step predicts."""
+    """Return the distance of a run with a wrong group, relative to the predicted error."""
     number = [name_of(solution) for solution in RUNS].index(name)
     right = pan2021(RUNS[number]["pitch_error"])
     wrong = right._replace(**{group: getattr(right, group) * (1.0 + share)})
@@ -228,13 +229,13 @@ def test_exponent_of_a_periodic_orbit_is_that_of_its_floquet_multipliers(number)
         outcome = follow(orbit, DEFAULT * by, transient=600, periods=600, points=1)
         exponent, standard_error = largest_exponent(outcome.growth, np.array([PERIOD]))
         assert standard_error[0] < 5e-4
-        # A vector that turns is longer or shorter at the end by chance: less so after more periods.
+        # The final length of a rotating vector depends on chance; more periods reduce the effect.
         half, _ = largest_exponent(outcome.growth[:, :300], np.array([PERIOD]))
         exponents.append(exponent)
         chance.append(abs(exponent[0] - half[0]))
     found, _ = predicted(*exponents)
     distance = abs(exponents[0][0] - orbit["largest_exponent"])
-    # Chance acts on the exponent of the default, and on the difference that predicts its error.
+    # Chance affects the exponent of the default, and the difference that predicts its error.
     assert distance < found + 3.0 * max(chance) + EXACT
     assert max(chance) < 1e-5
 

@@ -1,4 +1,4 @@
-"""The order of the method, measured: slope of log error over log step where nothing is crossed."""
+"""The measured order of the method: the slope of log error over log step."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_growth_of_the_tangent_vector_converges_with_order_four(scene, pitch_err
         outcome = run(pan2021(pitch_error), scene, start, steps=steps, periods=PERIODS)
         return np.cumsum(outcome.growth[0])
 
-    # The tangent vector starts along all modes alike, the stiff axial ones too.
+    # More steps: the tangent vector starts with all modes, including the stiff axial modes.
     steps = 2 * STEPS
     errors = [largest_difference(total_growth(s), total_growth(FINE)) for s in steps]
     assert measured_order(errors, steps) == CLASSICAL
@@ -77,7 +77,8 @@ def test_clearance_crossings_leave_an_error_that_falls_like_the_square_of_the_st
         outcome = run(pan2021(0.0), steps=int(steps), periods=solution["periods"][-1])
         return largest_difference(outcome.section[0, at], wanted)
 
-    # Where in its step a crossing falls is chance: a mean over many step counts shows the law.
+    # The place of a crossing within its step is random. A mean over many step counts shows the
+    # order.
     coarse = np.mean([error(steps) for steps in range(200, 240)])
     fine = np.mean([error(steps) for steps in range(800, 960, 4)])
     assert np.log(coarse / fine) / np.log(4.0) > 1.7

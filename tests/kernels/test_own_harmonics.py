@@ -1,6 +1,7 @@
-"""Lanes with harmonics of the mesh stiffness of their own move as an independent integration says.
+"""Lanes with their own harmonics of the mesh stiffness, against an independent integration.
 
-The reference is an adaptive method of order 8 that restarts at every crossing, lane by lane.
+The reference is an adaptive method of order 8. It integrates each lane separately and restarts at
+every crossing.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ START[0] = 1.2
 
 
 class OwnStiffness(Exact):
-    """One lane with these harmonics."""
+    """One lane with its own harmonics ``cosine`` and ``sine``."""
 
     def stiffness(self, tau):
         order = np.arange(1, COSINE.size + 1) * self.groups.mesh_frequency * tau
@@ -32,7 +33,7 @@ class OwnStiffness(Exact):
 
 
 def exact(effects, teeth=None, periods=PERIODS):
-    """States (lanes, periods, states) and numbers of crossings, lane by lane."""
+    """Return states, shape (lanes, periods, states), and the number of crossings of each lane."""
     found = []
     for lane, (cosine, sine) in enumerate(zip(COSINES, SINES, strict=True)):
         groups = GROUPS._replace(**{name: g[lane] for name, g in GROUPS._asdict().items()})
@@ -47,7 +48,7 @@ def exact(effects, teeth=None, periods=PERIODS):
 
 
 class Numbered:
-    """Groups of a lane with the number of its profile."""
+    """Groups of a lane, and the number of its profile."""
 
     def __init__(self, groups, profile):
         self.__dict__.update(groups._asdict(), profile=profile)

@@ -1,4 +1,4 @@
-"""Scenes name their implementations by classes that cannot be taken for others."""
+"""Scenes identify their implementations by classes that cannot be confused with others."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple

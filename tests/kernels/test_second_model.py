@@ -1,4 +1,4 @@
-"""The protocol of models serves another model than the gear pair, an oscillator with clearance."""
+"""The protocol of models serves not only the gear pair, but also an oscillator with clearance."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from .oscillator import Oscillators
 
 ZETA, LOAD, HALF_CLEARANCE = 0.05, 0.1, 1.0
 RECORDED = {"tangent": True, "contact": True, "loads": True}
-"""What all tests record: one loop of each method then serves them."""
+"""Records of all tests, so that one loop per method serves all of them."""
 
 
 def oscillators(frequency: np.ndarray, amplitude: float) -> Oscillators:
@@ -36,7 +36,7 @@ def test_the_motion_on_a_flank_is_the_linear_response(method, steps, error):
     plan = Plan(steps, 0, 20, 20, method=method, **RECORDED)
     outcome = integrate(system, start, plan)
     assert outcome.section == pytest.approx(np.repeat(start[:, np.newaxis], 20, axis=1), abs=error)
-    # The tangent vector shrinks as the free vibration does, with the rate zeta.
+    # The mass stays on the driving flank for all 20 periods.
     assert outcome.contact[:, 0, 0] == pytest.approx(20.0)
     mean_force = outcome.loads[:, 0, 2]
     assert mean_force == pytest.approx(LOAD, abs=1e-6)

@@ -1,4 +1,4 @@
-"""The source of the kernels: short functions, and documentation of what other layers use."""
+"""The source of the kernels has short functions and a documented public interface."""
 
 import ast
 import inspect

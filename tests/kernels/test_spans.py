@@ -1,4 +1,4 @@
-"""Long runs: what RK4 does to energy and phase is known exactly, and nothing else may happen."""
+"""Long runs: energy and phase change exactly as theory predicts for RK4."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ NAMED = ["no-backlash", "zero-clearance-plain", "zero-clearance-resolved"]
 
 
 def after(model, start: np.ndarray, steps: int, periods: int) -> np.ndarray:
-    """Return the state that RK4 itself has: R(h A)^n with R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24."""
+    """Return the state of RK4: R(h A)^n with R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24."""
     values, vectors = np.linalg.eig(system(model)[0])
     z = values * 2.0 * np.pi / model.mesh_frequency[0] / steps
     factor = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
@@ -89,7 +89,7 @@ def test_energy_without_damping_never_grows_and_falls_as_the_method_predicts(
     model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
     start = state(delta_5=1.0)
     outcome = run(model, scene, start, steps=steps, periods=10_000, resolved=resolved)
-    # The axial pair acts on nothing.
+    # Axial motion does not act back on the other states.
     found = energy(model, outcome.section[0, :, :6])
     assert np.diff(found).max() < 1e-13
     predicted = np.stack([after(model, start, steps, number) for number in (1, 2000, 10_000)])
@@ -119,7 +119,7 @@ def test_the_amplitude_of_a_single_oscillator_falls_by_the_sixth_power_of_the_st
 
 
 def rattling(steps: int, resolved: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the relative gain in energy of undamped motions between the flanks, and crossings."""
+    """Return relative energy gains of undamped motions between the flanks, and crossings."""
     speeds = np.linspace(0.5, 2.0, 32)
     starts = np.stack([state(delta_5_rate=speed) for speed in speeds])
     outcome = run(
@@ -139,7 +139,7 @@ def rattling(steps: int, resolved: bool) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("steps", "largest"), [(100, 1e-4), (200, 4e-6), (400, 1.2e-7)])
 def test_split_steps_keep_the_energy_of_an_undamped_pair_that_rattles(steps, largest):
     gain, crossings = rattling(steps, resolved=True)
-    # In contact the method dissipates, by the fifth power of the step, and nothing adds to it.
+    # In contact the method dissipates with the fifth power of the step; nothing adds energy.
     assert gain.max() < 1e-11
     assert gain.min() > -largest
     assert (crossings > 1000).all()
@@ -165,7 +165,7 @@ def test_a_periodic_motion_stays_where_it_is_for_twenty_thousand_periods(resolve
         resolved=resolved,
     )
     assert outcome.status.tolist() == [Status.OK]
-    # Neither the place nor the phase of the motion drifts: both coordinates keep their digits.
+    # The motion drifts neither in place nor in phase: both coordinates keep their digits.
     assert np.ptp(outcome.section, axis=1).max() < 1e-13
     assert np.ptp(outcome.growth[0].reshape(20, 1000).mean(axis=1)) < 1e-2
     if resolved:
@@ -202,7 +202,8 @@ def test_the_exponent_of_the_full_scene_does_not_depend_on_how_the_run_is_cut():
 
 
 def test_what_a_tangent_vector_loses_never_becomes_denormal():
-    # The torsion decays faster than the axial pair: after so long by more than a number can hold.
+    # Torsion decays faster than axial motion. After 40 000 periods, their ratio is below the range
+    # of numbers.
     tangent = run(pan2021(0.5), FULL, steps=40, periods=40_000, points=1, resolved=True).end_tangent
     assert not np.any((tangent != 0.0) & (np.abs(tangent) < 1e-160))
     assert np.linalg.norm(tangent) == pytest.approx(1.0)

@@ -1,4 +1,4 @@
-"""The stages of Pan 2021, figure 7, where the pair identified from the paper has them."""
+"""The stages of Pan 2021, figure 7, computed with the pair identified from the paper."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ POINTS = 240
 
 @pytest.fixture(scope="module")
 def stages() -> dict[float, tuple[np.ndarray, float, float]]:
-    """Section points, exponent and its standard error of each multiple, from rest."""
-    # The slowest multiplier is near 0.95 a period: 0.95^800 is below 1e-17.
+    """Section points, exponent and standard error of the exponent for each multiple, from rest."""
+    # The slowest multiplier is about 0.95 per period, and 0.95^800 is below 1e-17.
     how = {"steps": 200, "transient": 800, "periods": 1200, "points": POINTS, "resolved": True}
     outcome = run(pan2021(MULTIPLES), NO_AXIAL, **how)
     exponent, error = largest_exponent(outcome.growth, np.full(len(MULTIPLES), PERIOD))
@@ -45,7 +45,7 @@ def test_chaotic_stage_never_repeats(stages, multiple):
     section, _, _ = stages[multiple]
     for period in range(1, 33):
         assert np.abs(section[period:, 0] - section[:-period, 0]).max() > 0.05
-    # It fills bands, not a few points.
+    # The section fills bands, not only a few points.
     assert np.unique(np.round(section[:, 0], 3)).size > 100
 
 
@@ -57,7 +57,7 @@ def test_chaotic_stage_has_a_positive_exponent_far_beyond_its_standard_error(sta
 
 
 def test_the_start_decides_between_two_periodic_motions_at_the_hop():
-    # Pan 2021 jumps at 1.12; here at 1.05 from rest and at 1.09 from the contact flank.
+    # Pan 2021 has the jump at 1.12. Here it is at 1.05 from rest and at 1.09 from contact.
     starts = np.stack([state(), state(delta_5=1.1626540685832338)])
     how = {"steps": 200, "transient": 800, "periods": 2, "resolved": True}
     settled = run(pan2021([1.07, 1.07]), NO_AXIAL, starts, **how, points=2)

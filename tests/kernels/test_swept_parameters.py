@@ -1,4 +1,4 @@
-"""Every group may differ from lane to lane: a batch is its lanes, integrated one by one."""
+"""Every group may differ between lanes: a batch equals its lanes integrated separately."""
 
 import numpy as np
 import pytest
@@ -13,10 +13,13 @@ START = np.tile(state(delta_5=1.1, delta_1_rate=0.02, delta_3=0.01), (LANES, 1))
 HOW = {"steps": 96, "transient": 4, "periods": 6}
 SWEPT = [(group, True) for group in Groups._fields]
 SWEPT += [(group, False) for group in Groups._fields if group != "error_phase"]
-"""Groups, and whether steps are split: plain ones without phase, or they are compiled once more."""
+"""Groups, and whether steps are resolved; plain steps have no phase, to compile fewer loops."""
 
 OF_FRICTION = {"friction_coefficient", "friction_lever", "pitch_point_phase"}
-"""Groups of an effect that Pan 2021 leaves out; without phase, as other tests compile it."""
+"""Groups of friction, an effect that Pan 2021 leaves out.
+
+They are tested without phase, because other tests compile this loop.
+"""
 
 
 def effects_of(group: str) -> Effects:
@@ -42,13 +45,13 @@ def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group, re
     batch = run(model, effects, START, **HOW, resolved=resolved)
     for lane in range(LANES):
         assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, resolved, effects))
-    # No group is ignored: each moves the end state of a scene in which it acts.
+    # No group is ignored: each one changes the end state of a scene in which it acts.
     ends = batch.end_state[:, 0::2]
     assert (np.abs(ends[1:] - ends[:-1]).max(axis=1) > 1e-9).all()
 
 
 def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone():
-    # The lane of phase zero, alone, runs in a loop compiled without phase.
+    # If the lane with phase zero is integrated alone, its loop is compiled without phase.
     model = BASE._replace(error_phase=np.linspace(-0.4, 0.4, LANES))
     assert model.error_phase[2] == 0.0
     batch = run(model, FULL, START, **HOW, resolved=True)

@@ -38,11 +38,11 @@ def test_series_are_exact_where_elements_of_every_kind_cross(size, steps):
 @given(
     size=st.sampled_from(SIZES),
     seed=st.integers(100, 10_000),
-    # Not 0: the compiled loops leave out what is zero in all lanes.
+    # Not 0: terms that are zero in all lanes are left out, which would need another loop.
     held=st.sampled_from([1.0, 0.01, -0.05]),
     steps=st.sampled_from([1, 4, 30]),
 )
-# An element is in contact for less time than a step of the adaptive method would take.
+# Here a contact is shorter than a step that the adaptive method would choose.
 @example(size=(3, 2), seed=961, held=-0.05, steps=1)
 def test_series_are_exact_for_random_systems_with_and_without_springs_to_the_ground(
     size, seed, held, steps
@@ -62,7 +62,7 @@ def test_contact_and_crossings_are_those_of_flow_maps(size):
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_gaps_within_a_step_are_those_of_flow_maps(size):
-    """The states are any numbers, so that each element begins steps on any flank."""
+    """The states are random, so that elements begin steps on every flank and apart."""
     machines, _, _, _, _ = exact(*size)
     system, steps = lanes_of(machines), 120
     states = np.random.default_rng(4).normal(size=(system.lanes, steps + 1, 2 * size[0]))
@@ -103,14 +103,15 @@ def test_series_record_the_loads_of_fine_steps(size):
     wanted = integrate(system, start, Plan(3200, **WITH_LOADS)).loads
     found = integrate(system, start, Plan(4, **SERIES)).loads
     size = np.abs(wanted[..., :2]).max(axis=2)
-    # Forces jump where dampers act in contact only; 240 steps and 3200 steps sample that.
+    # Forces jump where dampers act in contact only. These jumps are sampled by 240 and by 3200
+    # steps.
     assert (np.abs(found[..., :2] - wanted[..., :2]).max(axis=2) <= 2e-3 * size).all()
     assert (np.abs(found[..., 2] - wanted[..., 2]) <= 2e-3 * size).all()
 
 
 @pytest.fixture(scope="module")
 def crowd():
-    """Lanes of three machines of six elements, their plan and their outcome."""
+    """Lanes of three machines with six coordinates and four elements; start, plan and outcome."""
     system = lanes_of([random_machine(n % 3, 6, 4) for n in range(43)])
     start = 0.5 * np.random.default_rng(3).normal(size=(system.lanes, 12))
     start[5] = np.nan

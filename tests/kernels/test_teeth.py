@@ -1,4 +1,4 @@
-"""Pitch errors tooth by tooth: how they are shared, when they repeat, what they leave alone."""
+"""Pitch errors of single teeth: their shares, their repetition, and independent lanes."""
 
 import numba
 import numpy as np
@@ -15,7 +15,7 @@ from .twin import Twin, shared_error
 
 STEPS = 60
 TOTAL = 2 * LANES + 5
-"""Lanes that each have teeth of their own."""
+"""Number of lanes; each one has its own teeth."""
 MODEL = pan2021(np.linspace(1.0, 15.0, TOTAL), error_mean=np.linspace(-0.1, 0.1, TOTAL))
 START = np.random.default_rng(7).uniform(-1.5, 1.5, (TOTAL, 10))
 TEETH = drawn_teeth(4, 6, TOTAL)
@@ -24,7 +24,7 @@ PLAN = Plan(STEPS, 2, 10, 5, tangent=True, history_periods=1)
 
 
 def follow(chosen=slice(None), teeth: Teeth = TEETH, **plan):
-    """Integrate some lanes of this test, with split steps."""
+    """Integrate some lanes of this test, with resolved steps."""
     system = SYSTEM.replace(teeth=teeth).of(chosen)
     return integrate(system, START[chosen], PLAN._replace(**plan))
 
@@ -49,18 +49,18 @@ def test_the_shares_are_splines_that_add_up_to_one(teeth):
     for order in range(3):
         places = phase[:, np.newaxis] + np.arange(pairs)
         shares = np.nan_to_num(spline.derivative(order)(places)) / (2.0 * np.pi) ** order
-        # A place among the cells is rounded, too.
+        # The place within the cells is rounded, too.
         tolerance = 1e-14 * (cells / (2.0 * np.pi)) ** order
         assert table[:, order] == pytest.approx(shares[:, 1:], rel=0, abs=tolerance)
         assert shares.sum(axis=1) == pytest.approx(float(order == 0), rel=0, abs=tolerance)
-    # A mesh period ends where the next one begins, each pair one place further on.
+    # The end of a mesh period is the beginning of the next one, with each pair one place later.
     assert np.array_equal(table[-1, :, :-1], table[0, :, 1:])
 
 
 @pytest.mark.parametrize("entry", [0.0, 0.05, 0.125, 0.3, 0.99])
 @pytest.mark.parametrize("first", [0, 7])
 def test_a_pair_comes_into_mesh_at_its_own_phase(entry, first):
-    # Pair 0 alone is wrong, once in five periods; a cell is a twentieth of one.
+    # Only pair 0 has an error, once in five periods. A cell is a twentieth of a period.
     teeth = spur_teeth(1, 5, 1)._replace(entry=entry, profile=np.zeros(3, np.intp))
     teeth = teeth._replace(driving=np.zeros((1, 1)), driven=np.eye(5)[:1])
     model = MODEL._replace(error_mean=np.zeros(TOTAL), error_amplitude=np.ones(TOTAL))
@@ -94,7 +94,7 @@ def test_seven_pairs_in_mesh_act_as_those_of_the_twin():
 
 
 def equal_teeth(error: float, driving: int, driven: int) -> Teeth:
-    """Return teeth whose every pair has one error."""
+    """Return teeth with the same error for every pair."""
     shared = drawn_teeth(1, 1)
     profile = np.zeros(TOTAL, dtype=np.intp)
     return shared._replace(
@@ -144,7 +144,7 @@ def test_a_motion_goes_on_with_the_teeth_that_it_has_come_to():
         PLAN._replace(transient_periods=0, recorded_periods=5, first_period=7),
         tangent_start=first.end_tangent,
     )
-    # States are kept in units of eq. 13, and rounded there.
+    # States are stored in the units of eq. 13, which rounds them.
     assert second.section == pytest.approx(follow().section, rel=0, abs=1e-11)
 
 
@@ -186,7 +186,7 @@ def test_forces_along_a_motion_are_those_of_the_teeth_then_in_mesh(physical):
         wanted = np.array(
             [accelerations(twin, *at) for at in zip(tau, states[number], strict=True)]
         )
-        # In the order of the coordinates: delta_5 first, as in the twin.
+        # The order is that of the coordinates: delta_5 first, as in the twin.
         assert motion.accelerations[number] == pytest.approx(wanted, rel=0, abs=1e-10)
         forces = np.array([mesh_forces(twin, *at) for at in zip(tau, states[number], strict=True)])
         found = np.stack([motion.force_tangential[number], motion.force_axial[number]], axis=1)

@@ -1,8 +1,8 @@
-"""Errors of single teeth in the physical form: which plane they lie in, and what damps their mean.
+"""Errors of single teeth in the physical form: their plane, and the damping of their mean.
 
 Each pair in mesh has a constant error, so that the mean of the pairs in mesh acts on the mesh
-springs and not on the dampers. In the limit of a spur pair whose teeth take their load at once the
-mean is a row of steps, and the motion between them one of constant coefficients.
+springs and not on the dampers. If the teeth of a spur pair take their load at once, the mean is a
+sequence of steps; between the steps the equation of motion has constant coefficients.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from .twin import Twin
 
 ERRORS_ONLY = TORSION._replace(pitch_error=True)
 RECORDED = {"contact": True, "loads": True, "history_periods": 1}
-"""What all tests record: one loop then serves those of the physical form."""
+"""Records of all tests, so that one loop serves all tests of the physical form."""
 FORCE, ERROR = 0, 1
 LARGEST, SMALLEST = range(2)
 FREQUENCY, DAMPING, LOAD = 0.2, 0.15, 1.0
@@ -27,7 +27,10 @@ TEETH = np.array([0.0, 0.9, -0.7, 0.4, -0.2])
 
 
 def spur_system(smoothing: float, physical: bool = True) -> GearPairs:
-    """Return a spur pair of contact ratio 1.5 whose teeth take their load in so short a time."""
+    """Return a spur pair of contact ratio 1.5.
+
+    ``smoothing``: time in which a tooth takes its load, in mesh periods.
+    """
     cells = round(6.0 / smoothing)
     assert cells % 2 == 0
     share = np.repeat([0.5, 1.0, 0.5], cells // 2)
@@ -41,14 +44,14 @@ def spur_system(smoothing: float, physical: bool = True) -> GearPairs:
         "mass_ratio_g": 1.0,
     }
     groups = Groups(*(np.full(1, values.get(name, 0.0)) for name in Groups._fields))
-    # Without clearance and variation of the stiffness, a scene that has both moves as one that has
-    # neither; the other tests of this file have compiled the loop of the physical form.
+    # Clearance and stiffness variation are zero, so a scene with both effects has the same motion
+    # as a scene without them. Other tests of this file have compiled the loop of the physical form.
     scene = TORSION_ONLY if physical else ERRORS_ONLY
     return GearPairs(scene, groups, np.zeros(0), np.zeros(0), physical, teeth)
 
 
 def extremes(smoothing: float, physical: bool = True) -> np.ndarray:
-    """Return the largest and the smallest mesh force once the motion repeats."""
+    """Return the largest and the smallest mesh force of the periodic motion."""
     steps = round(12.0 / smoothing)
     plan = Plan(max(steps, 400), 5 * TEETH.size, TEETH.size, 1, **RECORDED)
     loads = integrate(spur_system(smoothing, physical), np.zeros((1, 2)), plan).loads
@@ -56,10 +59,10 @@ def extremes(smoothing: float, physical: bool = True) -> np.ndarray:
 
 
 def extremes_of_steps() -> np.ndarray:
-    """Return the extremes of x'' + F = load, F = x - e + 2 xi x', with e a row of steps.
+    """Return the extremes of F in x'' + F = load, F = x - e + 2 xi x' with piecewise constant e.
 
-    Half of each period one pair carries, the other half two that share. The state is followed by
-    matrix exponentials until it repeats.
+    One pair carries the load in one half of each period; two pairs share it in the other half. The
+    state follows from matrix exponentials until it repeats.
     """
     parts = 0.5 * (TEETH + np.roll(TEETH, 1)), TEETH
     levels = np.stack(parts, axis=1).ravel()
@@ -81,7 +84,7 @@ def test_forces_of_a_spur_pair_tend_to_those_of_teeth_that_take_their_load_at_on
     limit = extremes_of_steps()
     smoothings = np.array([0.12, 0.06, 0.03, 0.015, 0.01])
     missing = np.array([np.abs(extremes(smoothing) - limit).max() for smoothing in smoothings])
-    # In the share of a period in which teeth take their load the pair moves in proportion to it.
+    # While teeth take their load, the pair moves by a distance proportional to this time.
     assert measured_order(missing, 1.0 / smoothings) > 0.9
     assert missing[-1] < smoothings[-1] * PERIOD
 
@@ -110,7 +113,7 @@ def recorded():
 
 
 def rates_of_the_error(number: int, phases: np.ndarray) -> np.ndarray:
-    """Return the rate of the error that the teeth of a lane share, per unit of tau."""
+    """Return the rate of the shared error of the teeth of a lane, per unit of tau."""
     twin = Twin(lane(MODEL, number), TORSION_ONLY, True, MESH)
     twin.groups.profile = MESH.profile[number]
     period = 2.0 * np.pi / twin.groups.mesh_frequency
@@ -132,7 +135,7 @@ def test_teeth_meet_with_the_speed_of_the_gears_and_graze_with_that_of_the_gap(r
     _, told, motion = recorded
     phases = 6.0 + np.arange(told.history.shape[1]) / 6400
     for number in range(LANES):
-        # Measured from the error of the teeth, delta_5 is the gap of rigid bearings.
+        # delta_5 is measured from the error of the teeth, so it is the gap if bearings are rigid.
         gap, gap_rate = told.history[number].T
         flank = motion.contact_tangential[number]
         before = np.flatnonzero(np.diff(flank))

@@ -1,4 +1,4 @@
-"""Pitch errors tooth by tooth in the linear scene, whose response to any error is known exactly."""
+"""Pitch errors of single teeth in the linear scene, whose response to any error is known."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from .reference import NO_BACKLASH, OMEGA, drawn_teeth, pan2021, run
 from .test_linear import one, response, resting_state, system
 from .test_order import measured_order
 
-# Damped well: a transient is gone after a few dozen periods.
+# With this damping, a transient decays within a few dozen periods.
 MODEL = pan2021(
     5.86,
     error_mean=0.1,
@@ -25,7 +25,7 @@ TRANSIENT = 60
 
 
 def teeth_with(driving, driven) -> Teeth:
-    """Return helical shares and the errors of one profile."""
+    """Return teeth with helical shares and the errors of one profile."""
     return SHARED._replace(driving=np.array([driving], float), driven=np.array([driven], float))
 
 
@@ -39,7 +39,7 @@ def share_wave(order: np.ndarray) -> np.ndarray:
 
 
 def error_lines(teeth: Teeth, repeats: int, orders: np.ndarray) -> np.ndarray:
-    """Return Fourier coefficients of the shared error, by orders per mesh period."""
+    """Return Fourier coefficients of the shared error at the given mesh orders."""
     pairs = np.arange(repeats)
     errors = teeth.driven[0][pairs % teeth.driven.size]
     errors = errors - teeth.driving[0][pairs % teeth.driving.size]
@@ -50,23 +50,23 @@ def response_to_teeth(physical: bool, frequency: float) -> np.ndarray:
     """Return the phasor of the states for an error of the teeth of amplitude 1."""
     if not physical:
         return response(MODEL, physical, frequency)
-    # Measured from rest nothing but the mesh springs, and none of the dampers, sees the error.
+    # If delta_5 is measured from rest, the error acts on the mesh springs but not on the dampers.
     matrix, row_y, row_z = system(MODEL)
     springs = -row_y - np.tan(one(MODEL, "base_helix_angle")) * row_z
     moved = np.linalg.solve(1.0j * frequency * np.eye(10) - matrix, springs)
-    # And delta_5 is measured from the error.
+    # Measure delta_5 from the error.
     moved[:2] -= 1.0, 1.0j * frequency
     return moved
 
 
 def resting(physical: bool) -> np.ndarray:
-    """Return the state under the load and the mean of the errors alone."""
+    """Return the static state under the load and the mean of the errors."""
     loaded = resting_state(MODEL._replace(error_mean=np.zeros(1)), physical)
     return loaded + one(MODEL, "error_mean") * response_to_teeth(physical, 0.0).real
 
 
 def measured_lines(teeth: Teeth, repeats: int, steps: int, physical: bool = False) -> np.ndarray:
-    """Return the Fourier coefficients of the states over the mesh periods of a whole turn."""
+    """Return the Fourier coefficients of the states over ``repeats`` mesh periods."""
     outcome = run(
         MODEL,
         NO_BACKLASH,
@@ -97,7 +97,7 @@ def test_one_wrong_tooth_gives_the_comb_of_its_gear(driving, driven, every, phys
     wanted[0] += resting(physical)
     largest = np.abs(wanted[1:, 0]).max()
     assert found[: orders.size] == pytest.approx(wanted, rel=0, abs=1e-9 * largest)
-    # There are whole orders of its gear only, and none of the mesh: the shares add up to one.
+    # Only whole orders of the gear occur. Mesh orders are absent, because the shares add up to one.
     number = np.arange(1, orders.size)
     comb = (number % every == 0) & (number % repeats != 0)
     assert np.abs(found[number[~comb]]).max() < 1e-12 * largest
@@ -105,7 +105,7 @@ def test_one_wrong_tooth_gives_the_comb_of_its_gear(driving, driven, every, phys
 
 
 def test_a_sine_over_the_teeth_of_a_gear_tends_to_the_sine_of_its_shaft_order():
-    # The shares smooth it like a weight over the phase, with this mean and variance.
+    # The shares smooth the sine like a weight over the phase with this mean and variance.
     weight = SHARED.share / SHARED.cells_per_period
     phase = SHARED.begins + (np.arange(weight.size) + 3.0) / SHARED.cells_per_period
     delay = np.sum(weight * phase)
@@ -123,5 +123,5 @@ def test_a_sine_over_the_teeth_of_a_gear_tends_to_the_sine_of_its_shaft_order():
         remaining.append(np.abs(np.fft.irfft(lines)).max() * lines.size / abs(wanted))
     assert smoothed[-1] == pytest.approx(2.0 * (np.pi / numbers[-1]) ** 2 * variance, rel=1e-3)
     assert measured_order(smoothed, numbers) > 1.95
-    # From tooth to tooth the sine is a staircase, at orders around those of the mesh.
+    # The sine has a step from tooth to tooth; these steps have orders near the mesh orders.
     assert measured_order(remaining, numbers) > 0.95

@@ -1,4 +1,4 @@
-"""Pitch errors tooth by tooth against exact motions: the order of the method holds."""
+"""Pitch errors of single teeth against exact motions: the method keeps its order."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,9 @@ from .test_evaluation import lane
 from .test_order import measured_order
 from .test_twin import named
 
-# Where within its step a knot of the splines falls changes the error, but not its order: at the
-# ends of steps in one row, and all over them in the other, but in all of a row alike.
+# The place of a spline knot within its step changes the error, but not its order. In the first row
+# knots lie at the ends of steps. In the second row they lie all over the steps. Within a row, the
+# places are the same for all step counts.
 STEPS = 20 * np.array([10, 12, 14, 17, 20, 24, 28, 34, 40]) + np.array([[0], [11]])
 PERIODS = 3
 START = np.stack(
@@ -30,7 +31,7 @@ START = np.stack(
     ]
 )
 LANES = len(START)
-# Bearings no stiffer than the mesh: else their free oscillation is most of the error.
+# The bearings are soft, because the free oscillation on stiff ones would dominate the error.
 MODEL = pan2021(
     5.86,
     error_mean=np.linspace(-0.1, 0.1, LANES),
@@ -43,13 +44,13 @@ SCENES = [NO_BACKLASH, FULL]
 
 
 def spur_teeth(driving: int, driven: int, lanes: int) -> Teeth:
-    """Return errors of so many teeth of spur gears of contact ratio 1.5: half a share, or one."""
+    """Return tooth errors of spur gears of contact ratio 1.5; a pair has the share 1/2 or 1."""
     helical = drawn_teeth(driving, driven, lanes)
     return helical._replace(share=np.repeat([0.5, 1.0, 0.5], helical.cells_per_period // 2))
 
 
 def assert_order(scene: Effects, physical: bool, teeth: Teeth) -> None:
-    """Compare with exact motions: order of every lane, and what is crossed."""
+    """Compare with exact motions: the order of every lane, and the numbers of crossings."""
     exact = []
     for number, start in enumerate(START):
         groups = lane(MODEL, number)
@@ -61,7 +62,7 @@ def assert_order(scene: Effects, physical: bool, teeth: Teeth) -> None:
     for row in STEPS:
         errors = []
         for steps in row:
-            # With a history, which changes nothing: other tests have compiled this loop.
+            # The history has no effect here; other tests have compiled this loop with a history.
             how = {"periods": PERIODS, "physical": physical, "history": 1}
             how["resolved"] = scene.backlash
             outcome = run(MODEL, scene, START, steps=int(steps), **how, teeth=teeth)

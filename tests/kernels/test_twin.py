@@ -1,4 +1,4 @@
-"""The kernels against their slow twin: every two effects in all combinations, both forms."""
+"""The kernels against their slow twin: all combinations of any two effects, in both forms."""
 
 from itertools import combinations
 from types import SimpleNamespace
@@ -31,12 +31,12 @@ NO_TRANSVERSE = TORSION._replace(backlash=True, axial=True, friction=True)
 FRICTION = FULL._replace(friction=True)
 SCENES = [FULL, TORSION_ONLY, NO_BACKLASH, LINEAR, TORSION, NO_TRANSVERSE]
 SCENES += [TORSION._replace(stiffness_variation=True, transverse=True, friction=True), FRICTION]
-"""No formula asks for more than two effects: each two are both there, either alone, and neither.
+"""No formula depends on more than two effects; any two occur together, each alone, and neither.
 
-Most of these scenes are those of other tests, and compiled for them anyway.
+Most of these scenes are compiled for other tests anyway.
 """
 
-# Different enough from Pan 2021 that no two groups could be mixed up unnoticed.
+# The groups differ enough from Pan 2021 that a test would detect any two that are mixed up.
 MODEL = pan2021(
     [5.0, 11.0],
     error_mean=[0.21, -0.13],
@@ -52,11 +52,11 @@ MODEL = pan2021(
     axial_damping_g=[0.02, 0.03],
     friction_coefficient=[0.2, 0.4],
     friction_lever=[0.41, 0.36],
-    # One within a step, and one where a step ends.
+    # One pitch point lies within a step, the other one at the end of a step.
     pitch_point_phase=[1.3, -1.5 * np.pi],
 )
 IN_PHASE = MODEL._replace(error_phase=np.zeros(2))
-"""The phase of the pitch error is an effect of its own, which one scene has."""
+"""The phase of the pitch error is a separate effect; only one scene has it."""
 START = np.stack(
     [
         state(delta_5=1.0, delta_1=0.02, delta_2_rate=-0.05, delta_3=0.3, delta_4_rate=0.1),
@@ -85,7 +85,7 @@ def test_every_two_effects_are_there_in_all_four_combinations():
 def test_kernels_share_the_errors_of_the_teeth_in_mesh(physical):
     teeth = drawn_teeth(3, 2, lanes=2)
     how = {"steps": STEPS, "periods": PERIODS, "physical": physical, "teeth": teeth}
-    # With a history, which changes nothing: other tests have compiled this loop.
+    # The history has no effect here; other tests have compiled this loop with a history.
     outcome = run(MODEL, NO_BACKLASH, START, **how, history=1)
     for number in range(2):
         groups = lane(number)
@@ -152,7 +152,7 @@ def test_a_scene_has_its_own_states_in_the_one_order():
 
 
 def test_axial_motion_acts_on_nothing_else():
-    # A step of Runge-Kutta is also split where the axial gap crosses.
+    # Flow maps, because Runge-Kutta steps are also split where the axial gap crosses.
     how = {"steps": STEPS, "periods": PERIODS, "resolved": FLOW_MAP}
     full = run(IN_PHASE, FULL, START, **how)
     without = run(IN_PHASE, NO_AXIAL, START, **how)

@@ -1,4 +1,4 @@
-"""What the compiler makes of the lane loop: wide registers, and nothing that the scene lacks."""
+"""The compiled lane loop uses wide registers and has no arithmetic of effects left out."""
 
 import functools
 import platform
@@ -28,14 +28,14 @@ SCALAR = re.compile(r"v(add|sub|mul|fn?m(add|sub)\d+)sd$")
 LABEL = re.compile(r"^\.LBB\w+:", re.MULTILINE)
 INSTRUCTION = re.compile(r"^\s+(v\w+)\s+(.*)$", re.MULTILINE)
 STORE = re.compile(r"%[yz]mm\d+, -?\d*\((?!%r[sb]p\))%r\w+")
-"""A wide register into memory, not to the stack, where spilled ones go; a short loop that is
-unrolled as a whole has no index."""
+"""Store of a wide register to memory, but not to the stack, where spilled registers are stored. A
+short loop that is completely unrolled has no index."""
 
 WIDE = ("ymm", "zmm")
 
 
 class Anew(KernelCache):
-    """What comes from the cache has no assembly to look at: compile it, and keep it for all."""
+    """Cache that stores loops but never loads them, because loaded code has no assembly."""
 
     def load_overload(self, _sig, target_context):
         target_context.refresh()
@@ -46,7 +46,7 @@ loop._cache = Anew(loop.py_func, CACHE_FOLDER)
 
 
 def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
-    """Return what the driver gets for a single lane, as `integrate` makes it."""
+    """Return the arguments that `integrate` passes to the driver for a single lane."""
     given: list[tuple] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batch, "_integrate_blocks", lambda *passed: given.append(passed))
@@ -56,21 +56,21 @@ def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
 
 
 class Loop(NamedTuple):
-    """What the compiler made of the loop over slots of one scene."""
+    """Instruction counts of the compiled loop over the slots of one scene."""
 
     counts: Counter[tuple[str, str]]
     """Vector instructions by mnemonic and register width."""
     copies: float
-    """How often the body of the loop stands there, for one vector of lanes each.
+    """Number of copies of the loop body, each for one vector of lanes.
 
-    The compiler unrolls or interleaves a loop as it pleases; nothing is said of an operation before
-    it is divided by this.
+    The compiler may unroll or interleave a loop, so counts have to be divided by this number before
+    they are compared.
     """
     scalars: int
-    """Sums and products of single numbers where the rows are written, which is the loop itself."""
+    """Scalar sums and products in the code that writes the rows, which is the loop itself."""
 
     def wide(self, mnemonic: str) -> int:
-        """Return the number of instructions of one kind on wide registers, whatever their end."""
+        """Return the number of wide instructions whose name begins with ``mnemonic``."""
         return sum(
             number
             for (found, width), number in self.counts.items()
@@ -91,26 +91,26 @@ class Loop(NamedTuple):
 
 
 def stores_of(instructions: list[tuple[str, str]]) -> int:
-    """Return how many wide registers are stored at an index."""
+    """Return the number of stores of wide registers to memory."""
     return sum(name.startswith("vmov") and bool(STORE.match(to)) for name, to in instructions)
 
 
 def rows_written(scene: Effects, tangent: bool, resolved: bool) -> int:
-    """Return how many rows of the memory of a block one step writes."""
+    """Return the number of rows of block memory that one step writes."""
     written = len(scene.states) * (2 if tangent else 1)
-    # Split steps keep what was before them, and say which lanes may have crossed.
+    # Resolved steps also store the previous values, and mark lanes that may have crossed.
     return 2 * written + 1 if resolved else written
 
 
 @functools.cache
 def loop_of(scene: Effects, tangent: bool, resolved: bool, /) -> Loop:
-    """Compile a scene, once, and count."""
+    """Compile a scene once, and count its instructions."""
     given = arguments(scene, tangent, resolved)
     loop(*given)
     assembly = loop.inspect_asm(loop.signatures[-1])
     rows = rows_written(scene, tangent, resolved)
     blocks = map(INSTRUCTION.findall, LABEL.split(assembly))
-    # What begins and ends a block of lanes has wide stores of its own, but fewer, or no arithmetic.
+    # The code that begins and ends a block also has wide stores, but fewer, or no arithmetic.
     body = [
         one
         for block in blocks
@@ -137,7 +137,8 @@ def test_a_step_is_done_on_many_lanes_at_once(tangent, resolved):
     found = loop_of(FULL, tangent, resolved)
     # Every row is written from wide registers, once in each copy of the loop.
     assert found.copies == int(found.copies) >= 1
-    # 10 states need about 190 operations a step, 350 with tangent, after fusion somewhat less.
+    # 10 states need about 190 operations per step, and 350 with a tangent vector. Fused operations
+    # reduce these numbers.
     assert found.per_vector() > (300 if tangent else 150)
     assert found.wide("vfmadd") / found.copies > 20
     assert found.wide("vmul") / found.copies > 20
@@ -164,7 +165,7 @@ def test_the_clearance_costs_one_minimum_and_one_maximum_for_each_stage_and_dire
 @pytest.mark.parametrize("tangent", [False, True], ids=["plain", "tangent"])
 def test_on_a_branch_the_stages_need_no_minimum_or_maximum(tangent):
     found = loop_of(FULL, tangent, True)
-    # Two for each direction, in the test for a crossing: the largest and smallest of three points.
+    # The test for a crossing has two per direction: the largest and smallest of three points.
     assert found.wide("vmax") <= 4 * found.copies
     assert found.wide("vmin") <= 4 * found.copies
 
@@ -176,7 +177,7 @@ def test_a_scene_without_backlash_has_no_minimum_or_maximum():
 
 
 def test_a_torsional_scene_has_none_of_the_arithmetic_of_the_bearings():
-    # It has a fifth of the states, without the dampers and springs of the other four fifths.
+    # It has a fifth of the states, and no dampers and springs of the other states.
     torsion = loop_of(TORSION._replace(pitch_error=True), True, False)
     assert torsion.per_vector() < 0.2 * loop_of(FULL, True, False).per_vector()
 
@@ -189,5 +190,5 @@ def test_a_run_without_exponent_has_none_of_the_arithmetic_of_the_tangent_vector
 def test_code_that_was_linked_into_a_loop_is_not_kept():
     loop_of(FULL, True, True)
     kinds = [kind for one in PARTS for signature in one.overloads for kind in signature]
-    # What belongs to no scene serves other loops.
+    # Functions without a scene are kept, because they serve other loops.
     assert kinds and not any(isinstance(kind, SceneType) for kind in kinds)

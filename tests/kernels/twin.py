@@ -1,7 +1,7 @@
-"""The slow, obvious twin of the kernels: eq. 13 of Pan 2021 as printed, one lane, NumPy only.
+"""Slow, simple twin of the kernels: eq. 13 of Pan 2021 as printed, one lane, NumPy only.
 
-It integrates delta_1 ... delta_5 themselves with the textbook form of the Runge-Kutta method, and
-the tangent vector by the variational equation: none of the kernels' scalings, tables or stages.
+It integrates delta_1 ... delta_5 with the textbook form of the Runge-Kutta method, and the tangent
+vector with the variational equation. It uses none of the kernels' scalings, tables or stages.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ DELTA_5, DELTA_1, DELTA_2, DELTA_3, DELTA_4 = range(5)
 
 
 class Motion(NamedTuple):
-    """State after each period, shape (periods, 10) in the order of `STATES`, and growth."""
+    """States after each period, shape (periods, 10) in the order of `STATES`, and growth."""
 
     states: np.ndarray
     growth: np.ndarray
 
 
 def spline(x: np.ndarray, degree: int = 5) -> np.ndarray:
-    """The B-spline with knots 0, 1, ... from powers that begin at each of them."""
+    """The B-spline with knots 0, 1, ... as a sum of powers that begin at the knots."""
     knots = np.arange(degree + 2)
     weights = np.array([(-1) ** k * math.comb(degree + 1, k) for k in knots])
     powers = np.maximum(x[..., np.newaxis] - knots, 0.0) ** degree
@@ -35,9 +35,9 @@ def spline(x: np.ndarray, degree: int = 5) -> np.ndarray:
 
 
 def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
-    """The errors of all tooth pairs around a phase in mesh periods, weighed by their shares.
+    """The errors of the tooth pairs at a phase in mesh periods, summed with their shares.
 
-    With its first and second derivative by the phase in radians.
+    The result contains the sum and its first and second derivative by the phase in radians.
     """
     driving, driven = teeth.driving[profile], teeth.driven[profile]
     begin = teeth.entry - 2.5 / teeth.cells_per_period
@@ -54,7 +54,7 @@ def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
 
 
 class Twin:
-    """One lane: groups are plain numbers, named as in `Groups`."""
+    """One lane; its groups are numbers with the names of `Groups`."""
 
     def __init__(
         self, groups, scene: Effects, physical: bool = False, teeth: Teeth | None = None
@@ -75,7 +75,7 @@ class Twin:
         return 1.0 + self.groups.stiffness_variation_scale * variation
 
     def error(self, tau):
-        """e(tau), its rate, and the inertial term -e'', Omega^2 e of the sine, eqs 13 and 14."""
+        """e(tau), its rate and the inertial term -e'' (for a sine Omega^2 e), eqs 13 and 14."""
         if not self.scene.pitch_error:
             return 0.0, 0.0, 0.0
         omega, amplitude = self.groups.mesh_frequency, self.groups.error_amplitude
@@ -91,31 +91,32 @@ class Twin:
     def changes_of_sliding(self):
         """The mesh phases, in periods from 0 to 1, at which sliding changes its sign.
 
-        There the contact passes the pitch point, and half a period later the next pair takes over.
+        At the first one the contact passes the pitch point. The next pair takes over half a period
+        later.
         """
         if not self.scene.friction:
             return np.zeros(0)
         return (self.groups.pitch_point_phase / (2.0 * np.pi) + np.array([0.0, 0.5])) % 1.0
 
     def sliding_at(self, phase):
-        """1 where the contact is before the pitch point, -1 where it is behind it."""
+        """1 if the contact is before the pitch point, -1 if it is beyond."""
         behind = phase - self.groups.pitch_point_phase / (2.0 * np.pi)
         return 1.0 if behind % 1.0 > 0.5 else -1.0
 
     def parts_of(self, begin, end):
-        """The ends of the parts of a step, phases in periods: sliding changes at none within."""
+        """The ends of the parts of a step, in periods; sliding keeps its sign within a part."""
         changes = self.changes_of_sliding() + np.floor(begin)
         near = 1e-9 * (end - begin)
         inside = changes[(changes > begin + near) & (changes < end - near)]
         return [begin, *np.sort(inside), end]
 
     def relative(self, delta, error):
-        """y_1 and y_2, eqs 6 and 7; with rates instead of displacements, their rates."""
+        """y_1 and y_2, eqs 6 and 7; given rates instead of displacements, it returns rates."""
         beta = self.groups.base_helix_angle
         along_mesh = delta[DELTA_1] - delta[DELTA_2] + delta[DELTA_5]
         if self.physical:
             along_mesh = along_mesh + error
-        # What both gaps lose: the projections of eqs 2 to 5, of a length e in the normal direction.
+        # The error reduces both gaps by the projections (eqs 2 to 5) of a length along the normal.
         normal = error / np.cos(beta) if self.of_flanks else error
         y_1 = along_mesh - normal * np.cos(beta)
         y_2 = delta[DELTA_3] - delta[DELTA_4] - np.tan(beta) * along_mesh - normal * np.sin(beta)
@@ -127,10 +128,10 @@ class Twin:
         return self.physical and self.teeth is not None and self.scene.pitch_error
 
     def damped_rates(self, rate, error_rate):
-        """The rates that the mesh damper sees: of y_1 and y_2, or of what the gears approach."""
+        """The rates that act on the mesh dampers: of y_1 and y_2, or of the gears' approach."""
         if not self.of_flanks:
             return self.relative(rate, error_rate)
-        # delta_5 is measured from e, and the approach of the gears is not.
+        # delta_5 is measured from e, but the approach of the gears is not.
         approach = rate[DELTA_1] - rate[DELTA_2] + (rate[DELTA_5] + error_rate)
         axial = rate[DELTA_3] - rate[DELTA_4]
         return approach, axial - np.tan(self.groups.base_helix_angle) * approach
@@ -198,14 +199,14 @@ class Twin:
         return np.concatenate([rate, acceleration, tangent_rate, tangent_acceleration])
 
     def from_rest(self, tau, sign=1.0):
-        """What measuring delta_5 from rest adds to state and tangent vector, shape (20,)."""
+        """Terms added to state and tangent vector to measure delta_5 from rest, shape (20,)."""
         added = np.zeros(20)
         if self.of_flanks:
             added[DELTA_5], added[5 + DELTA_5], _ = np.multiply(sign, self.error(tau))
         return added
 
     def slope_from_rest(self, tau, joint):
-        """The time derivative where an error of teeth moves delta_5 along with itself."""
+        """Time derivative of state and tangent vector, with delta_5 measured from rest."""
         slope = self.slope(tau, joint + self.from_rest(tau, -1.0))
         if self.of_flanks:
             _, rate, inertia = self.error(tau)
@@ -222,7 +223,7 @@ class Twin:
         return joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
 
     def integrate(self, start, steps: int, periods: int) -> Motion:
-        """Take ``steps`` Runge-Kutta steps in each mesh period, in coordinates at rest."""
+        """Take ``steps`` Runge-Kutta steps per mesh period, with delta_5 measured from rest."""
         # Here displacements come first, then rates.
         start = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         joint = np.concatenate([start, self.present / np.sqrt(np.sum(self.present))])

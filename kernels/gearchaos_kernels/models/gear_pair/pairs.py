@@ -274,7 +274,7 @@ class GearPairs(LaneSystem):
         if self.effects.pitch_error and self.teeth is not None:
             return "flow maps know pitch errors that are a sine, not those of teeth"
         if self.effects.friction:
-            return "flow maps know no friction, whose sign changes within the mesh period"
+            return "flow maps cannot integrate friction, whose sign changes within the mesh period"
         return ""
 
     def of(self, chosen: slice | NDArray[np.intp] | list[int]) -> Self:
