@@ -47,6 +47,9 @@ STABLE_ORBITS, UNSTABLE_ORBITS = "stable orbits", "unstable orbits"
 ON_CIRCLE = 1e-6
 """Distance of a multiplier from the unit circle within which its side is not known."""
 
+LEAST_LABELLED = 0.02
+"""Least share of the width of the axes that is labelled with a digit."""
+
 LEAST_MODULUS = 1e-4
 """Smallest modulus of a multiplier that a page shows."""
 
@@ -299,24 +302,29 @@ def _shown(branch: PeriodicBranch, longest: float) -> slice:
 def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Artist]:
     """Draw the moduli of all multipliers over the arclength, one branch beside the other.
 
-    Of a branch that grows, as much is drawn as of the longest one that does not.
+    Of a branch that grows, as much is drawn as of the longest one that does not. Neighbouring
+    branches of the same period share a label.
     """
     longest = max([float(one.arclength[-1]) for one in branches if not _grows(one)], default=np.inf)
     drawn: list[Artist] = [axes.axhline(1.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)))]
-    offset, places, names = 0.0, [], []
+    offset, ends = 0.0, dict[int, list[float]]()
     least = min(float(np.abs(one.multipliers).min()) for one in branches)
     for branch in branches:
         shown = _shown(branch, longest)
         moduli = np.maximum(np.abs(branch.multipliers[shown]), LEAST_MODULUS)
         along = branch.arclength[shown] - branch.arclength[shown][0]
         drawn += axes.plot(offset + along, moduli, color="black", linewidth=0.6)
-        length = float(along[-1])
-        places.append(offset + length / 2.0)
-        names.append(str(branch.period))
-        offset += length
+        ends.setdefault(branch.period, []).append(offset)
+        offset += float(along[-1])
+        ends[branch.period].append(offset)
         drawn.append(axes.axvline(offset, color="0.8", linewidth=0.5, zorder=0.0))
     axes.set(yscale="log", xlim=(0.0, offset), ylim=(max(least / 2.0, LEAST_MODULUS), None))
-    axes.set_xticks(places, names)
+    labelled = {
+        period: (some[0] + some[-1]) / 2.0
+        for period, some in ends.items()
+        if some[-1] - some[0] > LEAST_LABELLED * len(str(period)) * offset
+    }
+    axes.set_xticks([*labelled.values()], [*map(str, labelled)])
     axes.tick_params(axis="x", which="both", length=0.0)
     axes.set_xlabel("Period of the branch; along its arclength")
     axes.set_ylabel("Modulus of the\nFloquet multipliers")

@@ -14,6 +14,7 @@ import pytest
 
 import gearchaos
 from gearchaos.engine.branching import find_branches
+from gearchaos.figures import branches_page
 from gearchaos.records.branch import (
     CLOSED_CURVE,
     EDGE,
@@ -371,6 +372,15 @@ def test_the_diagram_and_the_page_are_drawn(files):
         assert drawn.code == 0, drawn.err
         assert drawn.out == f"{name}\n"
         assert (folder / name).stat().st_size > 10_000
+
+
+def test_branches_of_one_period_share_a_label(files):
+    found = read_branches(files[0] / "sweep_branches.h5")
+    lower = branches_page(found).axes[1]
+    periods = sorted({one.period for one in found.branches})
+    assert periods == [1, 2]
+    assert [one.get_text() for one in lower.get_xticklabels()] == ["1", "2"]
+    assert (np.diff(lower.get_xticks()) > 0.0).all()
 
 
 def test_a_report_lists_branches_and_special_points(files):
