@@ -3,7 +3,8 @@
 The table of a sweep has one row per lane and one column for each variable that has one number per
 lane. With --along section_point it has one row per section point. The table of a response has one
 row per instant; --along lane gives its lanes, and --spectrum its amplitude spectra. In physical
-units, times and frequencies are those of the speed of each lane.
+units, times and frequencies are those of the speed of each lane; a .mat file has them as
+time_seconds if the speeds differ.
 
 CSV files give the units in brackets in the headings, [1] for pure numbers; Parquet files give them
 in the attributes that pandas reads.
@@ -76,7 +77,8 @@ def _export(options: ExportOptions) -> None:
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
         if kind == "mat":
-            needed("scipy.io").savemat(partial, _arrays(result), appendmat=False)
+            seconds = _seconds_per_period(result, options) if over_time else None
+            needed("scipy.io").savemat(partial, _arrays(result, seconds), appendmat=False)
         else:
             frame = _table(result, options, over_time)
             if kind == "csv":
@@ -211,13 +213,22 @@ def _spectra(result: "Result", seconds: "Floats | None") -> Any:
     return frame
 
 
-def _arrays(result: "Result") -> dict[str, Any]:
-    """Return the arrays of a result by name, the words of their flags, and the metadata."""
+def _arrays(result: "Result", seconds: "Floats | None") -> dict[str, Any]:
+    """Return the arrays of a result by name, the words of their flags, and the metadata.
+
+    ``seconds``: mesh period of each lane, (lanes,). Where times are in mesh periods, those of each
+    lane in seconds are added.
+    """
     import numpy as np
+
+    from gearchaos.outputs.names import TIME
 
     flags = {v.name: v.flags for v in result.variables.values() if v.flags}
     words = {f"{name}_meanings": np.array(flags[name], dtype=object) for name in flags}
     arrays = {name: result[name] for name in result}
+    if seconds is not None and result.variables[TIME].units == "1":
+        shape = *(result[axis].size for axis in result.axes), result[TIME].size
+        arrays["time_seconds"] = np.outer(seconds, result[TIME]).reshape(shape)
     return {**arrays, **words, "metadata": result.metadata}
 
 

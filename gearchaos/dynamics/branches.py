@@ -107,6 +107,13 @@ Next to a resonance that nothing limits, states grow beyond all bounds at one pa
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
 
+BEGINNING = 1e-5, 1e-4
+"""Distance of a multiplier from 1 at the beginning of a branch up to which it may be rounding.
+
+The second one is for curves along which every point has flow maps of its own. Next to a grazing, a
+doubled branch may really fold while its halves hardly differ: multipliers then pass 1 quickly.
+"""
+
 NEARLY_HALF = 1e-4, 3e-4
 """Difference of both halves of an orbit at which its curve ends in orbits of half the period.
 
@@ -277,17 +284,10 @@ def _with_specials(
     located_between = yield from together(
         [specials_between(curve, one, other, located) for one, other in pairwise(points)]
     )
-    if not curve.exact and located_between:
-        # Next to the orbit of half the period, errors of the method look like folds.
-        for at in (end for end, reason in zip((0, -1), ends, strict=True) if reason == HALVING):
-            located_between[at] = [
-                one for one in located_between[at] if one[0] not in (FOLD, BRANCH_POINT)
-            ]
-    # Where a branch begins at a period doubling, it turns back, too: that is no fold.
-    located_between = [
-        [one for one in some if one[0] not in (FOLD, BRANCH_POINT) or not _begins_at(one[1])]
-        for some in located_between
-    ]
+    for at in _beginnings(curve, points, ends):
+        located_between[at] = [
+            one for one in located_between[at] if one[0] not in (FOLD, BRANCH_POINT)
+        ]
     found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
     joined = points[:1]
     for other, between in zip(points[1:], located_between, strict=True):
@@ -304,9 +304,27 @@ def _with_specials(
     return TracedBranch(curve, joined, places, positions, specials, ends)
 
 
-def _begins_at(point: CurvePoint) -> bool:
-    """Whether an orbit is that of half the period, up to the distance to which it is followed."""
-    return point.half_return < NEARLY_HALF[0]
+def _beginnings(curve: Curve, points: Sequence[CurvePoint], ends: tuple[str, str]) -> set[int]:
+    """Return the stretches next to an orbit of half the period in which folds may be none.
+
+    A branch turns back where it begins at a period doubling: rounding, or the errors of a method,
+    then decide on which side a multiplier of 1 lies.
+    """
+    found = {
+        at
+        for at, stretch in enumerate(pairwise(points))
+        if any(_begins(curve, one) for one in stretch)
+    }
+    if not curve.exact and len(points) > 1:
+        lasting = zip((0, len(points) - 2), ends, strict=True)
+        found |= {at for at, reason in lasting if reason == HALVING}
+    return found
+
+
+def _begins(curve: Curve, point: CurvePoint) -> bool:
+    """Whether an orbit is that of half the period, up to what rounding makes of a multiplier."""
+    from_one = float(np.min(np.abs(point.multipliers - 1.0)))
+    return point.half_return < NEARLY_HALF[0] and from_one < BEGINNING[curve.own_maps]
 
 
 def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | None]:

@@ -84,7 +84,7 @@ SIDES = "driving", "back"
 NEAR_FOLD = 0.3
 """Least real multiplier of a motion in a cell that may lie next to a fold."""
 
-APPROXIMATE = 1e-4
+APPROXIMATE = 1e-7
 """Length of the stretch of a branch in which a start is located; the equations then correct it."""
 
 

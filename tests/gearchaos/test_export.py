@@ -248,6 +248,19 @@ def test_each_speed_has_its_seconds_and_its_hertz(speeds, capsys):
     np.testing.assert_array_equal(of_speeds(table, "mesh_order [1]")[1], order)
 
 
+def test_matlab_gets_the_seconds_of_each_speed(speeds):
+    io = pytest.importorskip("scipy.io")
+    target = speeds.with_suffix(".mat")
+    assert main([str(speeds), str(target), "--overwrite"]) == 0
+    read, result = io.loadmat(target), open_result(speeds)
+    seconds = result["time"] / (21 * np.array(SPEEDS)[:, np.newaxis] / 60.0)
+    np.testing.assert_allclose(read["time_seconds"], seconds, rtol=1e-12)
+    np.testing.assert_array_equal(np.squeeze(read["time"]), result["time"])
+    assert main([str(speeds), str(target), "--overwrite", "--units", "dimensionless"]) == 0
+    assert "time_seconds" not in io.loadmat(target)
+    target.unlink()
+
+
 def test_options_that_do_nothing_are_refused(speeds, capsys):
     for ending, option in ((".mat", []), (".csv", ["--spectrum"])):
         target = speeds.with_suffix(ending)

@@ -11,7 +11,7 @@ from gearchaos.engine.bounding import find_boundaries
 from gearchaos.engine.branching import find_branches
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
-from gearchaos.records.branch import EDGE, GRAZING, GROWS, HALVING, PERIOD_DOUBLING
+from gearchaos.records.branch import EDGE, FOLD, GRAZING, GROWS, HALVING, PERIOD_DOUBLING
 
 MASS = """
 [model]
@@ -45,6 +45,59 @@ parameter = "{swept}"
 from = {low}
 to = {high}
 count = {count}
+
+[start]
+carry = "both"
+
+[outputs]
+section = ["x"]
+contact = true
+
+[integration]
+method = "taylor"
+transient_periods = 300
+recorded_periods = 100
+"""
+
+GRAZES_AT_ITS_BEGINNING = """
+[model]
+kind = "linear"
+frequency = 1.5604
+coordinates = ["x"]
+mass = [1.0]
+stiffness = [[0.3284]]
+damping = [0.078]
+
+[clearance.stop]
+gap = { x = 1.0 }
+stiffness = 39.7939
+damping = 0.1087
+damping_acts = "in_contact"
+half_clearance = 0.9134
+one_sided = true
+
+[clearance.play]
+gap = { x = 1.0 }
+stiffness = { mean = 6.2087, cosine = [0.5106], sine = [0.5483] }
+half_clearance = 0.5301
+damping = 0.0338
+
+[force.one]
+on = { x = 1.0 }
+mean = 0.0303
+amplitude = 0.6767
+
+[force.two]
+on = { x = 1.0 }
+amplitude = 0.2568
+order = 2
+phase_deg = 336.0378
+
+[sweep]
+parameter = "clearance.stop.half_clearance"
+from = 0.2
+to = 1.4
+count = 80
 
 [start]
 carry = "both"
@@ -315,3 +368,18 @@ count = 9
         frequency, amplitude = one.values.T
         response = amplitude / np.hypot(1.0 - frequency**2, BASE["damping"] * frequency)
         assert response == pytest.approx(1.0, abs=1e-10)
+
+
+def test_a_doubled_branch_may_fold_next_to_its_beginning():
+    """It grazes the stop just after the period has doubled."""
+    config = gearchaos.Configuration.from_toml(GRAZES_AT_ITS_BEGINNING, "machine.toml")
+    found = find_branches(gearchaos.run(config), longest=2).branches
+    folds = [one.value for branch in found for one in branch.specials if one.kind == FOLD]
+    assert sum(abs(one - 0.3908259829) < 1e-9 for one in folds) == 1
+    for branch in found:
+        # Stability changes at special points only.
+        values = sorted(one.value for one in branch.specials)
+        (changes,) = np.nonzero(np.diff(branch.stable))
+        for at in changes.tolist():
+            low, high = sorted(branch.value[at : at + 2].tolist())
+            assert any(low - 1e-9 <= one <= high + 1e-9 for one in values)
