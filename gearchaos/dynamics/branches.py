@@ -127,8 +127,13 @@ HALVED = 0.3
 Else a curve that is lost has not come near to the orbit of half its period.
 """
 
-AMPLITUDES = SIDEWAYS * np.array([1.0, -1.0, 0.3, -0.3, 0.1, 0.03, 0.01])
-"""Distances at which a doubled branch is searched, one after the other."""
+AMPLITUDES = SIDEWAYS * np.array(
+    [1.0, -1.0, 0.3, -0.3, 0.1, 0.03, 0.01, -0.01, 5e-3, -5e-3, 2e-3, 1e-3]
+)
+"""Distances at which a doubled branch is searched, one after the other.
+
+Where an orbit is very unstable, its doubled branch bends within the shortest of them.
+"""
 
 
 class Special(NamedTuple):
