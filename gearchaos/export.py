@@ -3,8 +3,8 @@
 The table of a sweep has one row per lane and one column for each variable that has one number per
 lane. With --along section_point it has one row per section point. The table of a response has one
 row per instant; --along lane gives its lanes, and --spectrum its amplitude spectra. In physical
-units, times and frequencies are those of the speed of each lane; a .mat file has them as
-time_seconds if the speeds differ.
+units, times and frequencies are those of the speed of each lane; if the speeds differ, a .mat file
+has the times in seconds as time_seconds.
 
 CSV files give the units in brackets in the headings, [1] for pure numbers; Parquet files give them
 in the attributes that pandas reads.
@@ -92,7 +92,7 @@ def _export(options: ExportOptions) -> None:
             rows, columns = frame.shape
             say(
                 f"{count_of(rows, 'row')} of {columns} columns and {_index(frame)}",
-                *_left(result, frame, options),
+                *_left(result, frame, options, over_time),
             )
     print(options.output, flush=True)
 
@@ -115,7 +115,7 @@ def _kind(options: ExportOptions) -> str:
     return kind
 
 
-def _left(result: "Result", frame: Any, options: ExportOptions) -> list[str]:
+def _left(result: "Result", frame: Any, options: ExportOptions, over_time: bool) -> list[str]:
     """Return lines about amplitudes that a table of lanes lacks, and about states without units."""
     from gearchaos.outputs.names import ORDER
 
@@ -124,7 +124,8 @@ def _left(result: "Result", frame: Any, options: ExportOptions) -> list[str]:
         lines.append(
             f"without the amplitudes over {ORDER}, which have a table of their own: --along {ORDER}"
         )
-    if "state" in options.along and options.units == "physical":
+    physical = options.units == "physical" or (options.units is None and over_time)
+    if "state" in options.along and physical:
         lines.append(
             "states along state are dimensionless, since one column cannot have several units"
         )

@@ -122,14 +122,15 @@ def progress(total: int | None, done: int = 0, unit: str = "lanes") -> Any:
     """Return a tqdm bar that prints how many units of ``total`` are done.
 
     On a terminal this is a bar; elsewhere, a plain line every half minute and one at the end. If
-    the total is not known (None), units are counted, without a line at the end.
+    the total is not known (None), units are counted in plain lines, and work of less than half a
+    minute prints none.
     """
     bar, lines = _bars()
     # The progress of a single unit is of no interest.
     disable = _quiet.get() or (total is not None and total < 2)
     common: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
     common |= {"disable": disable, "miniters": 1}
-    if sys.stderr is not None and sys.stderr.isatty():
+    if total is not None and sys.stderr is not None and sys.stderr.isatty():
         return bar(**common, dynamic_ncols=True)
     text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
     if total is None:

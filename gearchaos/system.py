@@ -40,7 +40,7 @@ from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLos
 from gearchaos.engine.branching import arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
-from gearchaos.engine.method_choice import with_method, without_maps
+from gearchaos.engine.method_choice import for_continuation, with_method
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond, sampled_steps
 from gearchaos.engine.run_plan import plan_run
@@ -433,8 +433,8 @@ class System:
     def _traced(self, over: BranchRange, orbit: Orbit, share: float) -> PeriodicBranch:
         """Return the branch through an orbit at a share of the range."""
         point = checked_state("orbit.point", orbit.point, self.states)
-        own_maps = over.own_maps(self._plan.method)
-        follower = System(without_maps(self.config)) if own_maps else self
+        config = for_continuation(self.config, over.own_maps)
+        follower = self if config is self.config else System(config)
         curve = over.curve(follower._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
         guess = np.append(point[0] / curve.scale, share)
         start = curve.corrected(guess, along_the_way(guess.size - 1))

@@ -132,7 +132,7 @@ AMPLITUDES = SIDEWAYS * np.array(
 )
 """Distances at which a doubled branch is searched, one after the other.
 
-Where an orbit is very unstable, its doubled branch bends within the shortest of them.
+Doubled branches of very unstable orbits bend so sharply that only short distances lead to them.
 """
 
 
@@ -310,7 +310,7 @@ def _with_specials(
 
 
 def _beginnings(curve: Curve, points: Sequence[CurvePoint], ends: tuple[str, str]) -> set[int]:
-    """Return the stretches next to an orbit of half the period in which folds may be none.
+    """Return the stretches next to an orbit of half the period in which folds may be errors.
 
     A branch turns back where it begins at a period doubling: rounding, or the errors of a method,
     then decide on which side a multiplier of 1 lies.
@@ -335,7 +335,7 @@ def _begins(curve: Curve, point: CurvePoint) -> bool:
 def doubled_start(curve: Curve, doubling: CurvePoint) -> Finding[CurvePoint | None]:
     """Search the first point of the branch of twice the period that begins at a period doubling.
 
-    The state moves along the eigenvector of the multiplier -1, by `SIDEWAYS`.
+    The state moves along the eigenvector of the multiplier -1, by one of `AMPLITUDES`.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def nearest_extremes(
 
     ``flanks`` (lanes,) are those of one element. Of several extremes that is the one nearest to a
     phase in steps; where the phase is NaN, the one nearest to the flank. NaN where the gap has no
-    extreme.
+    extreme, or where series reach less far than the shortest steps.
     """
     return _nearest(_Orbits.of(system, plan, history), flanks, phases, FINEST)
 

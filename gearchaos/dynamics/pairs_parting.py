@@ -15,7 +15,7 @@ from gearchaos.dynamics.arclength import OnCurve
 from gearchaos.dynamics.side_by_side import Search
 
 NEAR_ZERO = 0.5
-"""Largest ratio of the extreme of a parabola through three values to the one in the middle.
+"""Largest ratio of the extreme of a parabola to the value with which it begins to be searched.
 
 Where the extreme is larger, there are no two special points to part.
 """
@@ -26,11 +26,11 @@ SHORT_STRETCH = 1e-5
 SAME_PLACE = 1e-9
 """Distance below which two points that were found are one."""
 
-MOST_PARTINGS, MISSES, PROGRESS = 8, 1, 0.75
-"""Largest number of points with which a point between two special points is searched.
+MOST_PARTINGS = 8
+"""Largest number of points with which a point between two special points is searched."""
 
-That many of them may have a value above this share of the least one before.
-"""
+MISSES, PROGRESS = 1, 0.75
+"""How many of them may have a value above this share of the least value before."""
 
 Point = TypeVar("Point", bound=OnCurve)
 Asked = TypeVar("Asked")
@@ -96,7 +96,7 @@ def _among_three(values: Floats, lengths: Floats) -> tuple[Mask, Floats, Floats]
     Returned are whether it does so, its distance from the second point, and its extreme, which is
     positive if it has the sign of the values. The second value has the least amount of the three.
     """
-    size, sign = np.abs(values), np.sign(values[1:-1])
+    size = np.abs(values)
     same = (values[:-2] * values[1:-1] > 0.0) & (values[1:-1] * values[2:] > 0.0)
     least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
     before, after = lengths[:-1], lengths[1:]
@@ -106,7 +106,7 @@ def _among_three(values: Floats, lengths: Floats) -> tuple[Mask, Floats, Floats]
         slope = (slopes[:-1] * after + slopes[1:] * before) / (before + after)
         away = -slope / (2.0 * bend)
         extreme = size[1:-1] - slope**2 / (4.0 * bend)
-        near = same & least & (bend > 0.0) & (sign != 0.0) & (away != 0.0)
+        near = same & least & (bend > 0.0)
         near &= (-before < away) & (away < after) & (extreme <= NEAR_ZERO * size[1:-1])
     return near, away, extreme
 
@@ -124,9 +124,9 @@ def _headed_both_ways(values: Floats, lengths: Floats) -> list[_Expected]:
 def _headed(values: Floats, lengths: Floats) -> list[_Expected]:
     """Return where values head for zero with the slope of the stretch before.
 
-    Next to a grazing a test function may turn within a stretch, like the root of the distance: none
-    of the points then has the least value. The parabola through both ends of a stretch has the
-    slope with which the values arrive there.
+    Next to a grazing a test function may turn within a stretch, like the root of the distance. The
+    parabola through three points then stays far from zero, or no point has the least value. The
+    parabola through both ends of a stretch has the slope with which the values arrive there.
     """
     begin, end, length = values[1:-1], values[2:], lengths[1:]
     sign = np.sign(begin)
@@ -195,6 +195,8 @@ def parting(
         if new is None:
             return None
         (value,) = test([new])
+        if not np.isfinite(value):
+            return None
         if value * values[at] <= 0.0:
             return new
         misses += abs(value) > PROGRESS * np.min(np.abs(values[first : last + 1]))

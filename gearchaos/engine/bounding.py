@@ -22,14 +22,14 @@ from gearchaos.engine.branching import (
     BranchSearch,
     flank_name,
     require_range,
-    run_of_continuation,
 )
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.map_changes import DOUBLES, JUMP, Changes, MapChange, changes_of
 from gearchaos.engine.map_lines import Line, Ranges
+from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
-from gearchaos.engine.run_plan import RunPlan
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
 from gearchaos.engine.running import run as compute
 from gearchaos.errors import ConfigurationError
@@ -138,10 +138,10 @@ def find_boundaries(
         )
     require_range(config, name)
     over = Ranges.of(config)
-    run_of_search = run_of_continuation(
+    small = for_continuation(
         _small(config, PARAMETERS), lambda method: any(over.maps_depend(method))
     )
-    search = _BoundarySearch(over, run_of_search, longest, result)
+    search = _BoundarySearch(over, plan_run(small), longest, result)
     places = search.lines(lines)
     searched = 0
     with one_thread(), progress(None, unit="orbits") as bar:
@@ -535,7 +535,9 @@ class _BoundarySearch:
 
     def described(self, result: Result) -> BoundarySet:
         """Return the boundaries as arrays with their descriptions."""
-        run = self.run
+        run, config = self.run, self.over.config
+        if config.integration.method != run.config.integration.method:
+            config = config.integrated_by(run.config.integration.method)
         order = sorted(self.found, key=lambda one: (_rank(one.equations), one.ends[0]))
         sections = run.lanes.model.catalogue.variables((), {SECTION_PART: run.lanes.states})
         states = tuple(one for one in sections if one.name.startswith(known.SECTION))
@@ -550,7 +552,7 @@ class _BoundarySearch:
             "excitation_period": run.lanes.repeats_after,
             "longest_period": self.longest,
             **provenance(0.0),
-            "configuration_resolved": self.over.config.resolved_toml(),
+            "configuration_resolved": config.resolved_toml(),
         }
         del facts["wall_time_seconds"]
         return BoundarySet(parameters, states, tuple(self._arrays(order)), facts)

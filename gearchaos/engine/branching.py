@@ -8,7 +8,6 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Floats, Integers
-from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branch_specials import LOCATED
@@ -22,7 +21,7 @@ from gearchaos.dynamics.branches import (
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import counting, run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
-from gearchaos.engine.method_choice import without_maps
+from gearchaos.engine.method_choice import for_continuation
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -124,7 +123,7 @@ def find_branches(
         return system_of(config, {parameter: at}, config.needed_effects)
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
-    search = BranchSearch(over, run_of_continuation(config, over.own_maps), longest)
+    search = BranchSearch(over, plan_run(for_continuation(config, over.own_maps)), longest)
     with one_thread(), progress(None, unit="orbits") as bar:
         try:
             search.follow(search.motions(result, swept[0]), bar.update)
@@ -133,25 +132,6 @@ def find_branches(
                 keep(_described(search, result.variables[swept[0]]))
             raise
         return _described(search, result.variables[swept[0]])
-
-
-def run_of_continuation(config: Configuration, own_maps: Callable[[str], bool]) -> RunPlan:
-    """Return the run of a configuration with the method that follows orbits over its sweeps.
-
-    ``own_maps``: whether every value of a swept parameter has maps of its own, by the method.
-    """
-    planned = plan_run(config)
-    given = planned.plan.method
-    if not own_maps(given):
-        return planned
-    other = plan_run(without_maps(config))
-    taken = other.plan.method
-    if taken != given:
-        say(
-            f"orbits are followed with {METHODS[taken].title}, since each would need "
-            f"{METHODS[given].title} of its own"
-        )
-    return other
 
 
 class BranchSearch:

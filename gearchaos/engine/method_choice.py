@@ -1,5 +1,6 @@
 """The choice of a method where the configuration leaves it to the program."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
+from gearchaos.progress import say
 
 LANES_ESTIMATED = 2**14
 """Largest number of lanes from which the time of the methods is estimated."""
@@ -113,29 +115,40 @@ def with_method(config: Configuration) -> tuple[Configuration, str]:
     return possible[chosen], note
 
 
-def without_maps(config: Configuration) -> Configuration:
-    """Return a configuration with an exact method that makes no maps, if there is one.
+def for_continuation(config: Configuration, own_maps: Callable[[str], bool]) -> Configuration:
+    """Return a configuration with the method that follows orbits over a parameter.
 
-    Where every value of a parameter would have flow maps of its own, continuation takes less time.
-    Next to grazings they are more exact: neighbouring maps differ in their rounding, which a
-    difference over a small step of the parameter magnifies.
+    Where each orbit would need flow maps of its own, another exact method takes less time. Next to
+    grazings it is also more accurate: neighbouring maps differ in their rounding, and a difference
+    over a small step of the parameter magnifies this.
 
     Parameters
     ----------
     config : Configuration
         The configuration.
+    own_maps : callable
+        Whether every value of a parameter has maps of its own, by the name of the method.
 
     Returns
     -------
     Configuration
-        The same if its method makes no maps, or no other exact method can integrate it.
+        The same, unless maps would differ and another exact method can integrate it. A message
+        names the other method.
     """
     chosen, _ = with_method(config)
-    if not methods.METHODS[chosen.integration.method].shares_maps:
+    given = methods.METHODS[chosen.integration.method]
+    if not given.shares_maps or not own_maps(given.name):
         return config
     possible = alternatives(config).possible
     mapless = [one for one in INTEGRATORS if one.exact and not one.shares_maps]
-    return next((possible[one.name] for one in mapless if one.name in possible), config)
+    for method in mapless:
+        if method.name in possible:
+            say(
+                f"orbits are followed with {method.title}, since each would need "
+                f"{given.title} of its own"
+            )
+            return possible[method.name]
+    return config
 
 
 def _work(config: Configuration) -> float:

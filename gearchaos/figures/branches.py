@@ -48,7 +48,7 @@ ON_CIRCLE = 1e-6
 """Distance of a multiplier from the unit circle within which its side is not known."""
 
 LEAST_LABELLED = 0.02
-"""Least share of the width of the axes that is labelled with a digit."""
+"""Smallest share of the width of the axes that branches need for each digit of their label."""
 
 LEAST_MODULUS = 1e-4
 """Smallest modulus of a multiplier that a page shows."""
