@@ -100,6 +100,7 @@ def _explore(options: ExploreOptions) -> None:
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
     port = _free_port(HOST, options.port)
+    from gearchaos.explorer.closed_pages import ignore_closed_pages
     from gearchaos.explorer.overlay import read_overlaid
     from gearchaos.explorer.page import ExplorerPage
     from gearchaos.explorer.policy import origins, protect
@@ -119,6 +120,7 @@ def _explore(options: ExploreOptions) -> None:
         session_token_expiration=PATIENCE,
     )
     protect(application(server), port)
+    ignore_closed_pages()
     server.start()
     address = f"http://{HOST}:{port}/"
     print(address, flush=True)
