@@ -23,7 +23,7 @@ from gearchaos.dynamics.boundary_following import (
 from gearchaos.dynamics.boundary_passages import PARAMETERS, Following
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_specials import ROUNDING_OF_TESTS
-from gearchaos.dynamics.pairs_parting import joined_with, partings
+from gearchaos.dynamics.pairs_parting import partings, with_parted
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.boundary import (
     CUSP,
@@ -289,8 +289,7 @@ def _with_pairs_parted(
     for name in TESTS[equations.kind]:
         test, values = partial(_test, equations.kind, name), np.array([one[name] for one in tests])
         searches += partings(points, values, test, between)
-    found = yield from together([search for _, search in searches])
-    return joined_with(points, [*zip((at for at, _ in searches), found, strict=True)])
+    return (yield from with_parted(points, searches))
 
 
 def _cut(

@@ -23,7 +23,7 @@ from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint, cubic, is_exact
 from gearchaos.dynamics.curve_defects import Finding
 from gearchaos.dynamics.near_grazings import TestFunction, near_grazings
-from gearchaos.dynamics.pairs_parting import joined_with, parting, partings
+from gearchaos.dynamics.pairs_parting import parting, partings, with_parted
 from gearchaos.dynamics.side_by_side import together
 from gearchaos.records.branch import (
     BRANCH_POINT,
@@ -78,9 +78,7 @@ def with_pairs_parted(curve: Curve, points: list[CurvePoint]) -> Finding[list[Cu
         (at, parting(points[at - 1 : at + 2], (0, 2), test, between)) for at, test in grazings.tests
     ]
     searches += [(at, between(points[at], points[at + 1], share)) for at, share in grazings.between]
-    found = yield from together([search for _, search in searches])
-    beside = [at for at, _ in searches]
-    return joined_with(points, [*zip(beside, found, strict=True)])
+    return (yield from with_parted(points, searches))
 
 
 def _of_multipliers_along(points: Sequence[CurvePoint]) -> Iterator[tuple[TestFunction, Floats]]:

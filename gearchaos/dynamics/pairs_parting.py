@@ -12,7 +12,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats, Mask
 from gearchaos.dynamics.arclength import OnCurve
-from gearchaos.dynamics.side_by_side import Search
+from gearchaos.dynamics.side_by_side import Search, together
 
 NEAR_ZERO = 0.5
 """Largest ratio of the extreme of a parabola to the value with which it begins to be searched.
@@ -65,22 +65,21 @@ def partings(
     test: Callable[[Sequence[Point]], Floats],
     between: Callable[[Point, Point, float], Search[Asked, Answered, Point | None]],
 ) -> list[tuple[int, Search[Asked, Answered, Point | None]]]:
-    """Return the searches of points that part two zeros of a test function, for `joined_with`.
+    """Return the searches of points that part two zeros of a test function, for `with_parted`.
 
     ``values``: those of the function at all points, (points,); others as in `parting`. Each search
     comes with the number of the point beside which its result lies.
     """
-    found, beside = [], set[int]()
-    for at in nearly_zero(points, values):
-        first = max(at - 2, 0)
-        within = at - 1 - first, at + 1 - first
-        found.append((at, parting(points[first : at + 3], within, test, between)))
-        beside |= {at - 1, at}
+    near = nearly_zero(points, values)
+    ranges = [(at, at - 1, at + 1) for at in near]
     headed = {one.stretch for one in _headed_both_ways(values, _lengths(points))}
-    for at in sorted(headed - beside):
-        first = max(at - 1, 0)
-        within = at - first, at + 1 - first
-        found.append((at, parting(points[first : at + 3], within, test, between)))
+    beside = {at - 1 for at in near} | {*near}
+    ranges += [(at, at, at + 1) for at in sorted(headed - beside)]
+    found = []
+    for at, begin, end in ranges:
+        first = max(begin - 1, 0)
+        within = begin - first, end - first
+        found.append((at, parting(points[first : end + 2], within, test, between)))
     return found
 
 
@@ -207,13 +206,16 @@ def parting(
     return None
 
 
-def joined_with(points: list[Point], found: Sequence[tuple[int, Point | None]]) -> list[Point]:
-    """Return the points of a curve in order, with some that were found beside them.
+def with_parted(
+    points: list[Point], searches: Sequence[tuple[int, Search[Asked, Answered, Point | None]]]
+) -> Search[Asked, Answered, list[Point]]:
+    """Search points beside some points of a curve; return all of them in order.
 
-    ``found``: numbers of points, and the point found beside each, or None where there is none.
+    ``searches``: numbers of points, and the search of the point beside each.
     """
+    results = yield from together([search for _, search in searches])
     parted: list[tuple[int, float, Point]] = []
-    for at, one in found:
+    for (at, _), one in zip(searches, results, strict=True):
         if one is not None:
             first = at if _along(points[at], one, points[at + 1]) > 0.0 else at - 1
             parted.append((first, _along(points[first], one, points[first + 1]), one))

@@ -11,18 +11,14 @@ from gearchaos.arrays import Complex, Floats, Integers, Mask
 from gearchaos.dynamics.arclength import Curve, CurvePoint, along_the_way, repeats_sooner
 from gearchaos.dynamics.boundaries import Located, TracedBoundary, tracing, unstarted
 from gearchaos.dynamics.boundary_equations import Equations, OnBoundary
-from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passed, Passing, passed_of
+from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passing, passed_of
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.branch_range import only_map_parameter
 from gearchaos.dynamics.branches import Special, TracedBranch
 from gearchaos.dynamics.branches import tracing as tracing_branch
 from gearchaos.dynamics.curve_defects import Finding, defects_of
 from gearchaos.dynamics.side_by_side import Found, counting, run, together
-from gearchaos.engine.branching import (
-    BranchSearch,
-    flank_name,
-    require_range,
-)
+from gearchaos.engine.branching import BranchSearch, flank_name, require_range
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.map_changes import DOUBLES, JUMP, Changes, MapChange, changes_of
 from gearchaos.engine.map_lines import Line, Ranges
@@ -141,11 +137,10 @@ def find_boundaries(
     small = for_continuation(
         _small(config, PARAMETERS), lambda method: any(over.maps_depend(method))
     )
-    search = _BoundarySearch(over, plan_run(small), longest, result)
-    places = search.lines(lines)
     searched = 0
     with one_thread(), progress(None, unit="orbits") as bar:
-        search.count = bar.update
+        search = _BoundarySearch(over, plan_run(small), longest, result, bar.update)
+        places = search.lines(lines)
         try:
             search.begin_with_changes(result)
             for first in range(0, len(places), SIDE_BY_SIDE):
@@ -219,13 +214,24 @@ def _beginning(
 
 
 class _BoundarySearch:
-    """The boundaries that are known so far; ``result`` gives the scales of the states."""
+    """The boundaries that are known so far.
 
-    def __init__(self, over: Ranges, run: RunPlan, longest: int, result: Result) -> None:
+    ``result`` gives the scales of the states; ``count`` receives the numbers of orbits that are
+    computed.
+    """
+
+    def __init__(
+        self,
+        over: Ranges,
+        run: RunPlan,
+        longest: int,
+        result: Result,
+        count: Callable[[int], object],
+    ) -> None:
         self.over, self.run, self.longest = over, run, longest
         self.found: list[TracedBoundary] = []
         self.left: Changes
-        self.count: Callable[[int], object] = lambda _number: None
+        self._answers, self._defects = counting(passed_of, count), counting(defects_of, count)
         period, states = result.lanes("period"), result.lanes("end_state")
         moving = states[np.isfinite(states).all(axis=1) & (period > 0) & (period <= longest)]
         if not moving.size:
@@ -280,7 +286,7 @@ class _BoundarySearch:
             searches.append((search, search.following(search.motions(of_line, across))))
         plan = self.run.plan
         pending = [(search.over.steps_of_maps(plan), one) for search, one in searches]
-        _traced_together(pending, self.count)
+        self._traced_together(pending)
         for line, (search, _) in zip(lines, searches, strict=True):
             axis = known.axis_name(self.over.parameters[line.number])
             traced = count_of(len(search.found), "branch", "branches")
@@ -357,8 +363,20 @@ class _BoundarySearch:
             curve = over.curve(self.run.plan, one.period, self.scale)
             guess = np.append(one.state / self.scale, self.over.along(line, one.shares))
             searches.append((curve.plan.steps_per_period, _through(curve, guess)))
-        traced = _traced_together(searches, self.count)
+        traced = self._traced_together(searches)
         return [(line, one) for line, one in zip(lines, traced, strict=True) if one is not None]
+
+    def _traced_together(self, searches: Sequence[tuple[int, Finding[Found]]]) -> list[Found]:
+        """Return the results of searches along lines; those with equal steps share calls.
+
+        Each has the number of steps per period that its curves take.
+        """
+        found: dict[int, Found] = {}
+        for steps in sorted({one for one, _ in searches}):
+            same = [at for at, (one, _) in enumerate(searches) if one == steps]
+            results = run(together([searches[at][1] for at in same]), self._defects)
+            found.update(zip(same, results, strict=True))
+        return [found[at] for at in range(len(searches))]
 
     def _multipliers(self, changes: Changes) -> Complex:
         """Return the multipliers of the motions next to changes of a map, (changes, states).
@@ -415,10 +433,6 @@ class _BoundarySearch:
         direction = np.zeros(self.scale.size + PARAMETERS)
         direction[self.scale.size + number] = 1.0
         return direction
-
-    def _answers(self, requests: Sequence[Passing]) -> Sequence[Passed]:
-        """Return the orbits of some requests, and count them."""
-        return counting(passed_of, self.count)(requests)
 
     def _follow(self, searches: list[Following["_Begun"]]) -> None:
         """Follow the boundaries through points that lie on none that is known."""
@@ -581,23 +595,6 @@ class _BoundarySearch:
             float(boundary.positions[located.number]),
             located.point.multipliers,
         )
-
-
-def _traced_together(
-    searches: Sequence[tuple[int, Finding[Found]]], count: Callable[[int], object]
-) -> list[Found]:
-    """Return the results of searches along lines; those with equal steps share calls.
-
-    Each has the number of steps per period that its curves take. ``count`` receives the numbers of
-    orbits that are computed.
-    """
-    found: dict[int, Found] = {}
-    for steps in sorted({one for one, _ in searches}):
-        same = [at for at, (one, _) in enumerate(searches) if one == steps]
-        search = together([searches[at][1] for at in same])
-        results = run(search, counting(defects_of, count))
-        found.update(zip(same, results, strict=True))
-    return [found[at] for at in range(len(searches))]
 
 
 def _through(curve: Curve, guess: Floats) -> Finding[TracedBranch | None]:

@@ -307,22 +307,22 @@ def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Ar
     """
     longest = max([float(one.arclength[-1]) for one in branches if not _grows(one)], default=np.inf)
     drawn: list[Artist] = [axes.axhline(1.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)))]
-    offset, ends = 0.0, dict[int, list[float]]()
+    offset, spans = 0.0, dict[int, tuple[float, float]]()
     least = min(float(np.abs(one.multipliers).min()) for one in branches)
     for branch in branches:
         shown = _shown(branch, longest)
         moduli = np.maximum(np.abs(branch.multipliers[shown]), LEAST_MODULUS)
         along = branch.arclength[shown] - branch.arclength[shown][0]
         drawn += axes.plot(offset + along, moduli, color="black", linewidth=0.6)
-        ends.setdefault(branch.period, []).append(offset)
+        first, _ = spans.get(branch.period, (offset, offset))
         offset += float(along[-1])
-        ends[branch.period].append(offset)
+        spans[branch.period] = first, offset
         drawn.append(axes.axvline(offset, color="0.8", linewidth=0.5, zorder=0.0))
     axes.set(yscale="log", xlim=(0.0, offset), ylim=(max(least / 2.0, LEAST_MODULUS), None))
     labelled = {
-        period: (some[0] + some[-1]) / 2.0
-        for period, some in ends.items()
-        if some[-1] - some[0] > LEAST_LABELLED * len(str(period)) * offset
+        period: (first + last) / 2.0
+        for period, (first, last) in spans.items()
+        if last - first > LEAST_LABELLED * len(str(period)) * offset
     }
     axes.set_xticks([*labelled.values()], [*map(str, labelled)])
     axes.tick_params(axis="x", which="both", length=0.0)

@@ -3,6 +3,7 @@
 import atexit
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -298,6 +299,17 @@ def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
         time.sleep(0.005)
     with suppress(ProcessLookupError):
         os.kill(process, number)
+    return ended()
+
+
+def interrupted_at(
+    pattern: str, log: Path, module: str, arguments: Sequence[str], cwd: Path
+) -> Ended:
+    """Begin a command, interrupt it when its log matches a pattern, and return how it ended."""
+    process, ended = begin(module, arguments, cwd)
+    while is_running(process) and not (log.exists() and re.search(pattern, log.read_text())):
+        time.sleep(0.005)
+    os.kill(process, signal.SIGINT)
     return ended()
 
 

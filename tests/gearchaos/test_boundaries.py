@@ -1,10 +1,7 @@
 """Curves over two parameters, against exact values, one-parameter branches and closed forms."""
 
 import json
-import os
 import re
-import signal
-import time
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +23,7 @@ from gearchaos.records.branch import FOLD, GRAZING, PERIOD_DOUBLING
 from gearchaos.results.files.boundary_file import write_boundaries
 from gearchaos.results.files.boundary_reader import read_boundaries
 
-from .commands import begin, is_running, run_module
+from .commands import interrupted_at, run_module
 
 EXACT = json.loads((Path(__file__).parents[1] / "data" / "continuation.json").read_text())
 
@@ -334,12 +331,9 @@ def test_an_interrupt_keeps_what_was_found_and_leaves_an_earlier_file(files, tmp
     earlier.write_bytes(b"earlier")
     words = ("map.h5", "--lines", "40", "-o", str(earlier), "--overwrite")
     log = tmp_path / "log"
-    process, ended = begin("gearchaos.boundaries", (*words, "--log", str(log)), files[0])
-    found = re.compile(r"branches; [1-9]")
-    while is_running(process) and not (log.exists() and found.search(log.read_text())):
-        time.sleep(0.005)
-    os.kill(process, signal.SIGINT)
-    code, out, err = ended()
+    words += ("--log", str(log))
+    found = r"branches; [1-9]"
+    code, out, err = interrupted_at(found, log, "gearchaos.boundaries", words, files[0])
     assert (code, out) == (130, "")
     assert "gearchaos boundaries: interrupted\n" in err
     assert re.search(r"[1-9]\d* of 80 lines were searched", err)

@@ -1,10 +1,7 @@
 """Whole branches of periodic orbits, against independent exact values and from the command line."""
 
 import json
-import os
 import re
-import signal
-import time
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -26,7 +23,7 @@ from gearchaos.records.branch import (
 )
 from gearchaos.results.files.branch_reader import read_branches
 
-from .commands import begin, is_running, run_module
+from .commands import interrupted_at, run_module
 from .short_sweeps import PUMP
 
 
@@ -321,12 +318,8 @@ def test_an_interrupt_keeps_the_branches_that_were_found(files, tmp_path):
     earlier, log = tmp_path / "earlier.h5", tmp_path / "log"
     earlier.write_bytes(b"earlier")
     words = ("sweep.h5", "--periods", "16", "-o", str(earlier), "--overwrite", "--log", str(log))
-    process, ended = begin("gearchaos.branches", words, files[0])
-    found = re.compile(r"period \d+: \d+ orbits")
-    while is_running(process) and not (log.exists() and found.search(log.read_text())):
-        time.sleep(0.005)
-    os.kill(process, signal.SIGINT)
-    code, out, err = ended()
+    found = r"period \d+: \d+ orbits"
+    code, out, err = interrupted_at(found, log, "gearchaos.branches", words, files[0])
     assert (code, out) == (130, "")
     assert earlier.read_bytes() == b"earlier"
     kept = tmp_path / "earlier_interrupted.h5"

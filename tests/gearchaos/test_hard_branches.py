@@ -13,6 +13,26 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
 from gearchaos.records.branch import EDGE, FOLD, GRAZING, GROWS, HALVING, PERIOD_DOUBLING
 
+SWEEP = """
+[sweep]
+parameter = "{swept}"
+from = {low}
+to = {high}
+count = {count}
+
+[start]
+carry = "both"
+
+[outputs]
+section = ["x"]
+contact = true
+
+[integration]
+method = "taylor"
+transient_periods = 300
+recorded_periods = 100
+"""
+
 MASS = """
 [model]
 kind = "linear"
@@ -39,25 +59,8 @@ on = {{ x = 1.0 }}
 amplitude = {second}
 order = 2
 phase_deg = 30.0
-
-[sweep]
-parameter = "{swept}"
-from = {low}
-to = {high}
-count = {count}
-
-[start]
-carry = "both"
-
-[outputs]
-section = ["x"]
-contact = true
-
-[integration]
-method = "taylor"
-transient_periods = 300
-recorded_periods = 100
 """
+MASS += SWEEP
 
 GRAZES_AT_ITS_BEGINNING = """
 [model]
@@ -92,25 +95,10 @@ on = { x = 1.0 }
 amplitude = 0.2568
 order = 2
 phase_deg = 336.0378
-
-[sweep]
-parameter = "clearance.stop.half_clearance"
-from = 0.2
-to = 1.4
-count = 80
-
-[start]
-carry = "both"
-
-[outputs]
-section = ["x"]
-contact = true
-
-[integration]
-method = "taylor"
-transient_periods = 300
-recorded_periods = 100
 """
+GRAZES_AT_ITS_BEGINNING += SWEEP.format(
+    swept="clearance.stop.half_clearance", low=0.2, high=1.4, count=80
+)
 
 BASE = {
     "stiffness": 0.1,

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gearchaos.dynamics.pairs_parting import joined_with, partings
-from gearchaos.dynamics.side_by_side import run, together
+from gearchaos.dynamics.pairs_parting import partings, with_parted
+from gearchaos.dynamics.side_by_side import run
 
 
 class Place(NamedTuple):
@@ -32,8 +32,7 @@ def parted(function, shares):
         yield
 
     searches = partings(points, test(points), test, between)
-    found = run(together([search for _, search in searches]), lambda requests: requests)
-    joined = joined_with(points, [*zip((number for number, _ in searches), found, strict=True)])
+    joined = run(with_parted(points, searches), lambda requests: requests)
     return [one.place[0] for one in joined], len(tried)
 
 
