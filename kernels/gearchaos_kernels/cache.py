@@ -141,7 +141,8 @@ class KernelCache(NullCache):  # type: ignore[misc]
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store code for later processes; if that fails, a warning names the remedy."""
         try:
-            if data.library.has_dynamic_globals:  # Addresses in this process.
+            if data.library.has_dynamic_globals:
+                _warn_unfit("it contains addresses of this process")
                 return
             path = self._path(sig, data.codegen)
             with tempfile.TemporaryDirectory(dir=self._folder) as folder:

@@ -4,8 +4,9 @@ All flags are set here. Three properties of Numba and LLVM shape this file:
 
 * Cached code of a function contains the code of all functions that it calls. Numba does not notice
   an edit in another file. The cache folder is therefore named after a hash of all kernel sources.
-* Numba optimises every function on its own, and again in every function that it is linked into:
-  five times for the block of lanes. Here only functions that Python calls are optimised.
+* Numba links and optimises every function on its own, and again in every function that it is
+  linked into: five times for the block of lanes. Here this is done once, in the functions that
+  Python calls.
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Each costs up to half of the speed of the lane loop.
 """
@@ -102,16 +103,17 @@ def scalar(function: Callable[..., Any]) -> Any:
 
 
 def part(function: Callable[..., Any]) -> Any:
-    """Compile a function that only compiled code calls; it is not forced into its callers.
+    """Compile a function that only compiled code calls.
 
     It cannot create arrays. In exchange, references to its arguments are not counted, which takes
-    longer than the rest of a short function.
+    longer than the rest of a short function. It is inlined into its callers if the function whose
+    compilation first needs it is, because Numba hands this option down.
     """
     return _decorate(function, how=PART, _nrt=False, **NO_WRAPPERS)
 
 
 def maker(function: Callable[..., Any]) -> Any:
-    """Compile a part that creates arrays."""
+    """Compile a part that may create arrays."""
     return _decorate(function, how=PART, **NO_WRAPPERS)
 
 

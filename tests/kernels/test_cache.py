@@ -46,6 +46,13 @@ from gearchaos_kernels.compilation import CACHE_FOLDER, evaluator
 def double(number):
     return 2 * number
 
+# Numba refers to an array of more than 1 MB by its address.
+TABLE = np.ones(200_000)
+
+@evaluator
+def first_of_table():
+    return TABLE[0]
+
 def jacobian(transverse):
     groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
     effects = Effects(False, False, False, transverse, False)
@@ -220,6 +227,12 @@ def test_a_numba_whose_code_cannot_be_kept_computes_the_same(hook, tmp_path):
 
 
 @pytest.mark.slow
+def test_code_with_addresses_of_its_process_is_not_kept(tmp_path):
+    complaint = "it contains addresses of this process"
+    assert compute(tmp_path, "first_of_table()", complaint=complaint)["values"] == [1.0]
+    assert not list(tmp_path.rglob("*.nbc"))
+
+
 def test_code_that_another_numba_cannot_load_is_compiled(tmp_path):
     assert compute(tmp_path, REAL)["misses"] == 1
     hook, complaint = "numba.core.compiler:CompileResult._rebuild", "AttributeError: "
