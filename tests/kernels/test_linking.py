@@ -2,6 +2,7 @@
 
 import numba
 from gearchaos_kernels.compilation import evaluator, part
+from numba.core.caching import NullCache
 
 
 @part
@@ -20,6 +21,10 @@ def outer(number):
 def by_driver(number):
     """Call the outer part, which calls the inner one."""
     return outer(number)
+
+
+# A loaded driver would leave the parts to the other function.
+by_driver._cache = NullCache()
 
 
 @numba.njit
