@@ -67,7 +67,7 @@ class _Whole(JITCodeLibrary):  # type: ignore[misc]
 
     def finalize(self) -> None:
         """Link every function once, then finish as usual."""
-        reloading = getattr(self, "_reload_init", set())  # Old versions have none.
+        reloading: set[Any] = getattr(self, "_reload_init", set())  # Old versions have none.
         for library in _callers_first(self._linking_libraries):
             reloading.update(getattr(library, "_reload_init", ()))
             self._final_module.link_in(_own_module(library), preserve=True)
