@@ -233,6 +233,7 @@ def test_code_with_addresses_of_its_process_is_not_kept(tmp_path):
     assert not list(tmp_path.rglob("*.nbc"))
 
 
+@pytest.mark.slow
 def test_code_that_another_numba_cannot_load_is_compiled(tmp_path):
     assert compute(tmp_path, REAL)["misses"] == 1
     hook, complaint = "numba.core.compiler:CompileResult._rebuild", "AttributeError: "

@@ -153,16 +153,13 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
             apply(w, vector, w.element(2, maps), None)
             return context.get_dummy_value()
 
-        def apply_on(number):
-            engaged = [w.load(vector, (first + BRANCH * n) * STRIDE) for n in range(place.elements)]
-            mask = w.on_branches(number, engaged)
-            with builder.if_then(w.any(mask)):
-                at = builder.add(maps, builder.mul(number, INTEGER(place.size)))
-                apply(w, vector, w.element(2, at), mask)
-
         # One copy per set takes LLVM many times as long, and does not run faster.
         with for_range(builder, INTEGER(place.branches)) as loop:
-            apply_on(loop.index)
+            engaged = [w.load(vector, (first + BRANCH * n) * STRIDE) for n in range(place.elements)]
+            mask = w.on_branches(loop.index, engaged)
+            with builder.if_then(w.any(mask)):
+                at = builder.add(maps, builder.mul(loop.index, INTEGER(place.size)))
+                apply(w, vector, w.element(2, at), mask)
         return context.get_dummy_value()
 
     return generate
