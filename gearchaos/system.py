@@ -25,7 +25,7 @@ from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
-from gearchaos.dynamics.embedded import CLOSE_RETURN_RECORD, embedded_orbits
+from gearchaos.dynamics.embedded import embedded_orbits, record_length
 from gearchaos.dynamics.exponents import (
     Exponents,
     contact_shares,
@@ -36,7 +36,7 @@ from gearchaos.dynamics.following import Branch, Followed, Orbit, follow
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
+from gearchaos.dynamics.stability_loss import NOT_LOST, STABILITY_LOSS_TEXTS, StabilityLoss
 from gearchaos.engine.branching import arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
@@ -333,7 +333,7 @@ class System:
                 "next to the guess; give "
                 "another period or guess, or a longer integration.transient_periods"
             )
-        return self._orbit(found, period)
+        return self._orbit(found, period, self._record)
 
     def follow(
         self, orbit: Orbit, parameter: str, first: float, last: float, width: float = 1e-4
@@ -384,7 +384,7 @@ class System:
             width,
             self._plan,
         )
-        return self._branch(followed, orbit.period)
+        return self._branch(followed, parameter, orbit.period)
 
     def branch(self, orbit: Orbit, parameter: str, first: float, last: float) -> PeriodicBranch:
         """Follow an orbit over a parameter as a whole branch, stable and unstable.
@@ -445,15 +445,16 @@ class System:
             )
         return arrays_of_branch(over, trace(curve, start), plan_run(follower.config))
 
-    def orbits(self, period: int, record: int = CLOSE_RETURN_RECORD) -> list[Orbit]:
+    def orbits(self, period: int, record: int | None = None) -> list[Orbit]:
         """Find the periodic orbits that the motion comes near, also unstable ones within chaos.
 
         Parameters
         ----------
         period : int
             Period in excitation periods; orbits that repeat earlier are left out.
-        record : int
-            Excitation periods of the record, after the configured transient.
+        record : int, optional
+            Excitation periods of the record, after the configured transient. By default 20,000, or
+            as many as have 200,000 mesh periods, but not fewer than 100.
 
         Returns
         -------
@@ -476,8 +477,9 @@ class System:
         [True]
         """
         period = whole_number("period", period, least=1)
-        record = whole_number("record", record, least=period + 1)
         repeats = self.repeats_after
+        record = max(record_length(repeats), period + 1) if record is None else record
+        record = whole_number("record", record, least=period + 1)
         transient = self.config.integration.transient_periods
         plan = self._plan._replace(
             transient_periods=-(-transient // repeats) * repeats,
@@ -488,7 +490,8 @@ class System:
         self._require_sound(outcome)
         section = outcome.every(repeats).section[0]
         found = embedded_orbits(self._record, section, period, self._plan)
-        return [self._orbit(found.of(lane), period) for lane in range(found.converged.size)]
+        orbits = range(found.converged.size)
+        return [self._orbit(found.of(one), period, self._record) for one in orbits]
 
     def exponents(self, start: Floats | None = None) -> Exponents:
         """Compute all Lyapunov exponents over the configured record, after its transient.
@@ -688,25 +691,30 @@ class System:
         """Return a checked start state (states,)."""
         return checked_state("start", self.state if start is None else start, self.states)
 
-    def _orbit(self, found: Orbits, period: int) -> Orbit:
-        """Return the orbit of the only lane."""
-        duration = period * self._record.excitation_period[0]
+    def _orbit(self, found: Orbits, period: int, system: kernels.LaneSystem) -> Orbit:
+        """Return the orbit of the only lane of a system."""
+        # The multipliers of a long orbit may be smaller than the smallest number.
+        with np.errstate(divide="ignore"):
+            growth = np.log(np.abs(found.multipliers[0, 0]))
         return Orbit(
             period,
             found.points[0],
             found.multipliers[0],
-            float(np.log(np.abs(found.multipliers[0, 0])) / duration),
+            float(growth / (period * system.excitation_period[0])),
             float(found.residual[0]),
         )
 
-    def _branch(self, followed: Followed, period: int) -> Branch:
-        """Return the branch of the only lane."""
-        loss = StabilityLoss(int(followed.loss[0]))
+    def _branch(self, followed: Followed, parameter: str, period: int) -> Branch:
+        """Return the branch of the only lane over a parameter."""
+        loss, value = StabilityLoss(int(followed.loss[0])), followed.stable_value
+        # The length of a period may follow from the parameter.
+        found = np.isfinite(value).all()
+        system = self._at({parameter: value}) if found else self._record
         return Branch(
-            float(followed.stable_value[0]),
-            self._orbit(followed.stable, period),
+            float(value[0]),
+            self._orbit(followed.stable, period, system),
             float(followed.beyond_value[0]),
             loss,
-            STABILITY_LOSS_TEXTS[loss],
+            NOT_LOST if loss == StabilityLoss.STAYS_STABLE else STABILITY_LOSS_TEXTS[loss],
             complex(followed.multiplier[0]),
         )

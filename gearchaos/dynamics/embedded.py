@@ -7,8 +7,8 @@ from gearchaos.arrays import Floats
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.records.period import coordinate_scale
 
-CLOSE_RETURN_RECORD = 20_000
-"""Default length of a record in excitation periods."""
+LONGEST_RECORD, FEWEST_RETURNS, MOST_MESH_PERIODS = 20_000, 100, 200_000
+"""Longest and shortest default record in excitation periods, and its most mesh periods between."""
 
 CLOSE = 0.2
 """Largest distance of a close return, in the scales of the states."""
@@ -18,6 +18,15 @@ MOST_GUESSES = 2000
 
 SAME_ORBIT = 1e-6
 """Largest distance of the section points of two orbits that are the same, in their scales."""
+
+
+def record_length(repeats_after: int) -> int:
+    """Return the default length of a record in excitation periods.
+
+    ``repeats_after``: mesh periods after which the excitation repeats. With pitch errors of teeth,
+    these are hundreds, and fewer excitation periods have to do.
+    """
+    return int(np.clip(MOST_MESH_PERIODS // repeats_after, FEWEST_RETURNS, LONGEST_RECORD))
 
 
 def embedded_orbits(system: LaneSystem, section: Floats, period: int, plan: Plan) -> Orbits:

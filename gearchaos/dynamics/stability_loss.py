@@ -32,6 +32,9 @@ STABILITY_LOSS_TEXTS = (
     "the orbit could not be followed, with no multiplier near +1",
 )
 
+NOT_LOST = "the orbit stays stable up to the last value"
+"""The text of a loss for an orbit that is stable over its whole range."""
+
 
 def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]:
     """Return how orbits lose stability, from the multipliers on both sides of a boundary.

@@ -10,7 +10,7 @@ from gearchaos.configuration.tables import OF_CONTROLLERS, of_the_machine
 from gearchaos.dynamics.arclength import along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import TracedBranch, trace
-from gearchaos.dynamics.embedded import CLOSE_RETURN_RECORD, embedded_orbits
+from gearchaos.dynamics.embedded import embedded_orbits, record_length
 from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.lanes import start_states
 from gearchaos.engine.run_plan import RunPlan
@@ -21,7 +21,7 @@ from gearchaos.progress import count_of
 from gearchaos.records.period import coordinate_scale
 
 LEAST_TRANSIENT = 300
-"""Smallest number of excitation periods before the motion is searched for the orbit."""
+"""Smallest number of mesh periods before the motion is searched for the orbit."""
 
 ROUGH = 1e-3
 """Length of the stretch in which special points of the branch are located; none is used."""
@@ -94,9 +94,8 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
     assert control is not None
     system = machine_at(run, wanted.parameter, np.array([wanted.found_at]))
     repeats = system.repeats_after
-    transient = max(-(-plan.transient_periods // repeats), LEAST_TRANSIENT) * repeats
-    length = CLOSE_RETURN_RECORD * repeats
-    record = plan.over(length, transient)
+    transient = -(-max(plan.transient_periods, LEAST_TRANSIENT) // repeats) * repeats
+    record = plan.over(record_length(repeats) * repeats, transient)
     start = start_states(run.config, system, np.zeros(1, dtype=np.intp))
     outcome = kernels.integrate(system, start, record)
     found = np.zeros((0, start.shape[1]))

@@ -96,6 +96,17 @@ def test_an_orbit_is_followed_along_a_physical_key_as_along_its_group():
     assert by_key.orbit.point == pytest.approx(by_group.orbit.point, rel=1e-9)
 
 
+def test_the_exponent_of_a_followed_orbit_is_that_of_the_period_at_its_value():
+    begin, end = (gearchaos.System(PAN2021, pitch_error=5.0, mesh_frequency=f) for f in (0.9, 1.1))
+    branch = begin.follow(begin.orbit(), "mesh_frequency", 0.9, 1.1)
+    assert branch.value == branch.beyond == 1.1
+    assert branch.loss is StabilityLoss.STAYS_STABLE
+    assert branch.text == "the orbit stays stable up to the last value"
+    there = end.orbit(guess=branch.orbit.point)
+    assert branch.orbit.exponent == pytest.approx(there.exponent, rel=1e-9)
+    assert there.exponent == pytest.approx(np.log(abs(there.multipliers[0])) * 1.1 / (2.0 * np.pi))
+
+
 def test_exponents_of_a_linear_system_add_up_to_what_its_damping_says(linear):
     found = linear.exponents()
     assert found.values.sum() == pytest.approx(linear.sum_of_exponents(), abs=1e-4)
