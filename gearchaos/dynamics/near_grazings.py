@@ -129,7 +129,9 @@ class _Gap(NamedTuple):
         )
         least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
         # Estimates may have their least value one point aside.
-        beside = np.convolve(least, np.ones(3), "same") > 0.0 if least.size else least
+        beside = least.copy()
+        beside[1:] |= least[:-1]
+        beside[:-1] |= least[1:]
         chosen = np.flatnonzero(beside) + 1
         if not chosen.size:
             return

@@ -1,0 +1,63 @@
+"""Orbits of a curve that come near to grazing, however many orbits are looked at together."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan
+from gearchaos_kernels.models.linear.system import LinearSystems
+
+from gearchaos.dynamics.arclength import along_the_way
+from gearchaos.dynamics.branch_range import BranchRange
+from gearchaos.dynamics.branches import trace
+from gearchaos.dynamics.near_grazings import near_grazings
+
+DAMPING, LOAD = 0.4, 0.2
+PEAK = 1.0 / np.sqrt(1.0 - DAMPING**2 / 2.0)
+"""The frequency at which the response without separation is largest."""
+
+
+def spur_pairs(frequency):
+    """Return pairs whose teeth nearly separate at the frequency `PEAK`."""
+    lanes, one = frequency.size, np.ones((frequency.size, 1, 1))
+    force, spring = np.zeros((lanes, 1, 3)), np.zeros((lanes, 1, 3))
+    amplitude = DAMPING * np.sqrt(1.0 - DAMPING**2 / 4.0) * LOAD * (1.0 - 1e-5)
+    force[:, 0, 0], force[:, 0, 1], spring[:, 0, 0] = LOAD, amplitude * frequency**2, 1.0
+    return LinearSystems(
+        frequency=frequency,
+        position=0.0 * one,
+        rate=0.0 * one,
+        reaction=one,
+        force=force,
+        gap=one,
+        motion=0.0 * spring,
+        stiffness=spring,
+        damping=np.full((lanes, 1), DAMPING),
+        half_clearance=np.ones((lanes, 1)),
+        orders=(1,),
+    )
+
+
+@pytest.fixture(scope="module")
+def traced():
+    """The curve of the orbits that never separate, and its points."""
+    over = BranchRange(spur_pairs, PEAK - 0.3, PEAK + 0.5)
+    curve = over.curve(Plan(16, 0, 1, 1, method="flow_map"), 1, np.ones(2))
+    start = curve.corrected(np.array([1.0 + LOAD, 0.0, 0.1]), along_the_way(2))
+    return curve, trace(curve, start).points
+
+
+def test_the_orbit_that_comes_nearest_to_a_flank_is_found(traced):
+    curve, points = traced
+    (found, *_) = near_grazings(curve, points).tests
+    assert points[found[0]].share == pytest.approx(0.375, abs=0.02)
+
+
+@pytest.mark.parametrize("many", [3, 4, 5])
+def test_a_few_orbits_have_the_near_grazings_that_they_have_among_many(traced, many):
+    curve, points = traced
+    wanted = {at for at, _ in near_grazings(curve, points).tests}
+    found = set()
+    for first in range(len(points) - many + 1):
+        for at, _ in near_grazings(curve, points[first : first + many]).tests:
+            assert 0 < at < many - 1
+            found.add(first + at)
+    assert found == wanted
