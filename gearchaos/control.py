@@ -245,7 +245,8 @@ def _measure(name: str) -> str:
 def _number(value: complex) -> str:
     """Return a multiplier as text."""
     if abs(value.imag) < 1e-12:
-        return f"{value.real:.4f}"
+        # Without the sign of what is rounded to zero.
+        return f"{round(value.real, 4) + 0.0:.4f}"
     return f"{value.real:.4f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.4f}i"
 
 

@@ -106,7 +106,9 @@ def try_controller(controller: Controller, starts: int, periods: int) -> Control
     motion = controller.run(begin, periods)
     repeats = controller.system.repeats_after
     # The excitation begins again where the measured periods begin.
-    tried, shown = -(-periods // repeats) * repeats, SHOWN_PERIODS * repeats
+    tried = -(-periods // repeats) * repeats
+    # A whole period of the excitation, unless it is so long that its motion covers the panel.
+    shown = SHOWN_PERIODS * repeats if repeats <= SHOWN_PERIODS else SHOWN_PERIODS
     plan = controller.system.plan._replace(
         transient_periods=0, recorded_periods=shown, section_points=0, history_periods=shown
     )

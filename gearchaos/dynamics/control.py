@@ -9,21 +9,19 @@ J_j is the Jacobian of the map over mesh period j, b_j its derivative by the inp
 of the tangent frame of the kernels.
 """
 
-from typing import Any, NamedTuple
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 from gearchaos_kernels import Control, LaneSystem, Plan, integrate
-from numpy.typing import NDArray
 
 from gearchaos.arrays import Complex, Floats
+from gearchaos.dynamics.riccati import riccati
 from gearchaos.errors import ConfigurationError
 
 PROBE = 1e-3
 """Length of the tangent vector with which the input of the tangent frame is 1."""
-
-MOST_DOUBLINGS = 50
-"""Largest number of doublings for a Riccati equation; each squares what is left of the error."""
 
 UNCONTROLLABLE = 1e-6
 """Largest share of the input in a mode that counts as none; see `controllability`."""
@@ -56,8 +54,11 @@ class PeriodMaps(NamedTuple):
 
         Shape (states, mesh periods).
         """
-        after = [_product(self.jacobians[n + 1 :]) for n in range(len(self.points))]
-        return np.column_stack([one @ b for one, b in zip(after, self.responses, strict=True)])
+        after, found = np.eye(self.points.shape[1]), []
+        for jacobian, response in zip(self.jacobians[::-1], self.responses[::-1], strict=True):
+            found.append(after @ response)
+            after = after @ jacobian
+        return np.column_stack(found[::-1])
 
     def closed(self, gain: Floats) -> Floats:
         """Return the Jacobian over the whole orbit with gains, shape (mesh periods, states)."""
@@ -71,12 +72,12 @@ class PeriodMaps(NamedTuple):
         the loop: the shape is (n, n) with n = states * (mesh periods + 1).
         """
         periods, states = self.points.shape
-        steps = np.zeros((periods, states * (periods + 1), states * (periods + 1)))
         forced = self.responses[:, :, np.newaxis] * gain[:, np.newaxis]
-        steps[:, :states, :states] = self.jacobians - forced
-        steps[:, :states, -states:] += forced
-        steps[:, states:, :-states] = np.eye(states * periods)
-        return _product(steps)
+        # The newest state first. Each is given by rows of derivatives by all states before.
+        known = deque(np.split(np.eye(states * (periods + 1)), periods + 1))
+        for free, change in zip(self.jacobians - forced, forced, strict=True):
+            known.appendleft(free @ known[0] + change @ known.pop())
+        return np.vstack(known)
 
 
 def _product(matrices: Floats) -> Floats:
@@ -177,16 +178,14 @@ def require_controllable(maps: PeriodMaps, what: str) -> None:
 def lqr_gain(maps: PeriodMaps, state_weight: float, input_weight: float) -> Floats:
     """Return the gains that minimise a quadratic cost, shape (mesh periods, states).
 
-    The cost is the sum of q |x - r|^2 + r u^2 over all mesh periods; the discrete Riccati equation
-    of all periods together has a solution for each of them (cyclic form of Bittanti and
-    Colaneri 2009).
+    The cost is the sum of q |x - r|^2 + r u^2 over all mesh periods (Bittanti and Colaneri 2009).
     """
-    a, b = _cyclic(maps.jacobians), _cyclic(maps.responses[:, :, np.newaxis])
-    periods, states = maps.points.shape
-    weights = input_weight * np.eye(periods)
-    cost = riccati(a, b, state_weight * np.eye(periods * states), weights)
-    gain = np.linalg.solve(weights + b.T @ cost @ b, b.T @ cost @ a)
-    return np.array([gain[n, n * states : (n + 1) * states] for n in range(periods)])
+    a, b, states = maps.jacobians, maps.responses[:, :, np.newaxis], maps.points.shape[1]
+    cost = riccati(a, b, state_weight * np.eye(states), input_weight * np.eye(1))
+    # The input of a mesh period acts on the states at the end of this period.
+    priced = b.transpose(0, 2, 1) @ np.roll(cost, -1, axis=0)
+    gain: Floats = priced @ a / (input_weight + priced @ b)
+    return gain[:, 0]
 
 
 def placed_gain(maps: PeriodMaps) -> Floats:
@@ -222,68 +221,11 @@ def estimate_correction(
     disturbance : array, shape (states,)
         Standard deviation of what disturbs each state in a mesh period.
     """
-    periods, states = maps.points.shape
-    a = _cyclic(maps.jacobians)
-    c = np.kron(np.eye(periods), np.eye(states)[measured])
-    spread = np.kron(np.eye(periods), np.diag(disturbance**2))
-    variance = np.kron(np.eye(periods), np.diag(noise**2))
-    predicted = riccati(a.T, c.T, spread, variance)
-    gains = np.linalg.solve((c @ predicted @ c.T + variance).T, c @ predicted.T).T
-    signals = len(measured)
-    return np.array(
-        [
-            gains[n * states : (n + 1) * states, n * signals : (n + 1) * signals]
-            for n in range(periods)
-        ]
-    )
-
-
-def riccati(a: NDArray[Any], b: NDArray[Any], state: NDArray[Any], inputs: NDArray[Any]) -> Floats:
-    """Return the stabilising solution X of a discrete Riccati equation, shape (states, states).
-
-    X = A' X A - A' X B (R + B' X B)^-1 B' X A + Q, by structure-preserving doubling (Chu, Fan and
-    Lin 2005). It converges quadratically, also where multipliers are so small that the eigenvectors
-    of the equation, from which `scipy.linalg.solve_discrete_are` builds X, cannot be ordered.
-
-    Parameters
-    ----------
-    a, b : array, shape (states, states) and (states, inputs)
-        The matrices A and B of x' = A x + B u.
-    state, inputs : array, shape (states, states) and (inputs, inputs)
-        The symmetric weights Q and R.
-
-    Raises
-    ------
-    ConfigurationError
-        If no gain stabilises the system.
-
-    Examples
-    --------
-    >>> riccati(np.array([[2.0]]), np.eye(1), np.eye(1), np.eye(1)).round(6)
-    array([[4.236068]])
-    """
-    identity, solution = np.eye(len(a)), state
-    reach = b @ np.linalg.solve(inputs, b.T)
-    for _ in range(MOST_DOUBLINGS):
-        with np.errstate(all="ignore"):
-            step = np.linalg.solve(identity + reach @ solution, np.hstack([a, reach]))
-            moved, spread = step[:, : len(a)], step[:, len(a) :]
-            change = moved.T @ solution @ a
-            a, reach, solution = a @ moved, reach + a @ spread @ a.T, solution + change
-        if not np.isfinite(solution).all():
-            break
-        if np.abs(change).max() <= np.finfo(float).eps * np.abs(solution).max():
-            symmetric: Floats = (solution + solution.T) / 2.0
-            return symmetric
-    rule = "no gain stabilises the orbit or its estimate: the Riccati equation has no solution"
-    raise ConfigurationError(f"{rule}; change another input, or measure other states")
-
-
-def _cyclic(blocks: Floats) -> Floats:
-    """Return one matrix for all mesh periods: block n leads from period n to the next one."""
-    periods, rows, columns = blocks.shape
-    matrix = np.zeros((periods * rows, periods * columns))
-    for n, block in enumerate(blocks):
-        after = (n + 1) % periods
-        matrix[after * rows : (after + 1) * rows, n * columns : (n + 1) * columns] = block
-    return matrix
+    # The dual of the gains: transposed maps, backwards in time.
+    states = maps.points.shape[1]
+    a, c = maps.jacobians[::-1].transpose(0, 2, 1), np.eye(states)[measured]
+    variance, signals = np.diag(noise**2), np.broadcast_to(c.T, (len(a), *c.T.shape))
+    backwards = riccati(a, signals, np.diag(disturbance**2), variance)
+    predicted = np.roll(backwards[::-1], 1, axis=0)
+    seen = c @ predicted
+    return np.asarray(np.linalg.solve(seen @ c.T + variance, seen).transpose(0, 2, 1))

@@ -1,6 +1,6 @@
 """A page about a controller: section and input over time, capture times, and phase portraits."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,9 @@ from gearchaos.records.control import ControlledMotion
 
 SHOWN_STARTS = 4
 """Number of starts whose section and input are drawn."""
+
+MOST_LINES = 16
+"""Most section points of a target that are drawn as lines; those of a longer one over time."""
 
 COLOURS = (BLACK, BLUE, ORANGE, VERMILION)
 
@@ -90,9 +93,11 @@ def draw_section(axes: Axes, shown: ControlDrawing) -> None:
     time = np.arange(1, section.shape[1] + 1)
     for values, colour in zip(section, COLOURS, strict=False):
         axes.plot(time, values, ".", color=colour, markersize=1.5, markeredgewidth=0.0)
-    for number, point in enumerate(shown.target[:, 0]):
-        label = "target orbit" if number == 0 else None
-        axes.axhline(point, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), label=label)
+    target, look = shown.target[:, 0], dict[str, Any](color=GREY, label="target orbit")
+    if target.size <= MOST_LINES:
+        axes.hlines(target, 0, time[-1], linewidth=0.6, linestyle=(0, (4, 2)), **look)
+    else:
+        axes.plot(time, target[time % target.size], linewidth=0.4, zorder=0.5, **look)
     axes.set_xlim(0, shown_periods(shown.motion))
     axes.set_xlabel(shown.time_label)
     axes.set_ylabel(f"Section {symbol_of(shown.states[0])}")

@@ -13,8 +13,15 @@ from gearchaos_kernels import Plan, integrate
 import gearchaos
 from gearchaos.controlling.controller import Controller
 from gearchaos.controlling.trial import try_controller
-from gearchaos.dynamics.control import PeriodMaps, placed_gain, require_controllable, riccati
+from gearchaos.dynamics.control import (
+    PeriodMaps,
+    estimate_correction,
+    lqr_gain,
+    placed_gain,
+    require_controllable,
+)
 from gearchaos.dynamics.controllers import ControlSettings
+from gearchaos.dynamics.riccati import riccati
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
 
@@ -159,13 +166,56 @@ def test_the_riccati_equation_is_solved_where_multipliers_are_large_or_tiny(stat
     for factor in (1e-12, 0.3, 1.4):
         # Some modes decay within a period, as on a long orbit of many mesh periods.
         matrix = factor * a @ np.diag(np.logspace(0, -12, states))
-        found = riccati(matrix, b, np.eye(states), 3.0 * np.eye(2))
+        (found,) = riccati(matrix[np.newaxis], b[np.newaxis], np.eye(states), 3.0 * np.eye(2))
         gain = np.linalg.solve(3.0 * np.eye(2) + b.T @ found @ b, b.T @ found @ matrix)
         closed = matrix - b @ gain
         assert found == pytest.approx(np.eye(states) + matrix.T @ found @ closed, rel=1e-11)
         assert np.abs(np.linalg.eigvals(closed)).max() < 1.0
+    unreached = np.diag([1.5, 0.5])[np.newaxis], np.array([[[0.0], [1.0]]])
     with pytest.raises(ConfigurationError, match="no gain stabilises"):
-        riccati(np.diag([1.5, 0.5]), np.array([[0.0], [1.0]]), np.eye(2), np.eye(1))
+        riccati(*unreached, np.eye(2), np.eye(1))
+
+
+def cyclic(blocks):
+    """Return one matrix for all steps of a period: block n leads from step n to the next one."""
+    periods, rows, columns = blocks.shape
+    whole = np.zeros((periods, rows, periods, columns))
+    for n, block in enumerate(blocks):
+        whole[(n + 1) % periods, :, n] = block
+    return whole.reshape(periods * rows, periods * columns)
+
+
+@pytest.mark.parametrize("periods", [2, 3, 7])
+def test_gains_and_estimates_of_a_period_are_those_of_all_its_steps_in_one_matrix(periods):
+    random = np.random.default_rng(periods)
+    a, b = random.normal(size=(periods, 4, 4)), random.normal(size=(periods, 4))
+    maps = PeriodMaps(np.zeros((periods, 4)), a, b)
+    gain = scipy.linalg.block_diag(*lqr_gain(maps, 2.0, 10.0)[:, np.newaxis])
+    one, act, pay = cyclic(a), cyclic(b[:, :, np.newaxis]), 10.0 * np.eye(periods)
+    cost = scipy.linalg.solve_discrete_are(one, act, 2.0 * np.eye(4 * periods), pay)
+    wanted = np.linalg.solve(pay + act.T @ cost @ act, act.T @ cost @ one)
+    np.testing.assert_allclose(gain, wanted, atol=1e-9)
+    noise, disturbance = np.array([0.1, 0.3]), np.array([0.2, 0.1, 0.4, 0.3])
+    found = estimate_correction(maps, [0, 2], noise, disturbance)
+    see = np.kron(np.eye(periods), np.eye(4)[[0, 2]])
+    spread = np.kron(np.eye(periods), np.diag(disturbance**2))
+    variance = np.kron(np.eye(periods), np.diag(noise**2))
+    known = scipy.linalg.solve_discrete_are(one.T, see.T, spread, variance)
+    wanted = known @ see.T @ np.linalg.inv(see @ known @ see.T + variance)
+    np.testing.assert_allclose(scipy.linalg.block_diag(*found), wanted, atol=1e-9)
+
+
+def test_an_orbit_of_a_thousand_mesh_periods_has_gains_that_stabilise_it():
+    random = np.random.default_rng(0)
+    a, b = random.normal(size=(1081, 2, 2)), random.normal(size=(1081, 2))
+    maps = PeriodMaps(np.zeros((1081, 2)), 1.2 * a, b)
+    cost = riccati(maps.jacobians, b[:, :, np.newaxis], np.eye(2), 10.0 * np.eye(1))
+    gain = lqr_gain(maps, 1.0, 10.0)
+    closed = maps.jacobians - b[:, :, np.newaxis] * gain[:, np.newaxis]
+    later = np.roll(cost, -1, axis=0)
+    paid = np.eye(2) + 10.0 * gain[:, :, np.newaxis] * gain[:, np.newaxis]
+    assert cost == pytest.approx(paid + closed.transpose(0, 2, 1) @ later @ closed, rel=1e-9)
+    assert np.abs(maps.closed(gain)).max() < 1e-9
 
 
 @pytest.mark.parametrize("limit", PUBLISHED)
