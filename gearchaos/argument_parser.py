@@ -122,7 +122,7 @@ class OptionParser(ArgumentParser, Generic[Options]):
         """Return the flag that was probably meant."""
         from difflib import get_close_matches
 
-        near = get_close_matches(unknown.partition("=")[0], self._flags, 1)
+        near = get_close_matches(unknown.partition("=")[0], self._flags, 1, cutoff=0.7)
         return near[0] if near and unknown.startswith("--") else None
 
     @property

@@ -117,7 +117,7 @@ def table(found: "BoundarySet") -> list[str]:
     lines = []
     for number, one in enumerate(found.boundaries):
         ranges = ", ".join(
-            f"{name} {low:.6g} to {high:.6g}"
+            f"{name} {low:.6g} to {high:.6g}" if low < high else f"{name} = {low:.6g}"
             for name, low, high in zip(
                 names, one.values.min(axis=0), one.values.max(axis=0), strict=True
             )

@@ -13,6 +13,8 @@ import json
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
@@ -30,6 +32,7 @@ from gearchaos.options import (
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
     from gearchaos.engine.refinement import Boundary
+    from gearchaos.results.reading.contact_stretches import ContactStretch
     from gearchaos.results.reading.jumps import Apart, Crisis, Jump
     from gearchaos.results.reading.opinions import Opinions
     from gearchaos.results.reading.result import Result
@@ -37,6 +40,9 @@ if TYPE_CHECKING:
 
 
 WIDTH = 80  # Columns of a terminal.
+
+MOST_STRETCHES = 12
+"""Most stretches of contact that the table lists for a clearance."""
 
 
 class StagesOptions(NamedTuple):
@@ -95,6 +101,7 @@ class Listing(NamedTuple):
     boundaries: "list[Boundary] | None"
     jumps: "list[Jump]"
     crises: "list[Crisis]"
+    contact: "list[ContactStretch]"
     survival: "Survival | None"
     opinions: "Opinions | None"
 
@@ -135,6 +142,7 @@ def _listing(
     swept parameter.
     """
     from gearchaos.outputs.names import DIRECTION, REPEATS
+    from gearchaos.results.reading.contact_stretches import contact_stretches
     from gearchaos.results.reading.jumps import apart, crises, jumps
     from gearchaos.results.reading.opinions import second_opinions
     from gearchaos.results.reading.stage_table import (
@@ -162,6 +170,7 @@ def _listing(
         boundaries,
         [] if several else jumps(result),
         [] if several else crises(result),
+        [] if several else contact_stretches(result),
         outlasting,
         second_opinions(result, options.result) if options.zero_one else None,
     )
@@ -180,6 +189,7 @@ def _facts(listing: Listing) -> dict[str, Any]:
         **({} if listing.boundaries is None else {"boundaries": listing.boundaries}),
         "jumps": listing.jumps,
         "crises": listing.crises,
+        **({"contact": listing.contact} if listing.contact else {}),
         "survival": listing.survival,
         **({} if listing.opinions is None else {"zero_one": listing.opinions.facts()}),
     }
@@ -204,6 +214,7 @@ def _text(listing: Listing) -> str:
     unit = "" if unit == "1" else f" {unit}"
     below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed, unit)]
     below += directions_apart(listing.apart or ())
+    below += contact_lines(listing.contact)
     below += [listing.survival.text] if listing.survival else []
     below += listing.opinions.lines() if listing.opinions else []
     axis = f"{result.axis} [{unit.strip()}]" if unit else result.axis
@@ -319,6 +330,21 @@ def remarks(
     if mixed:
         yield f"{mixed} periodic lanes settled within their record, which begins with another"
         yield "motion; raise integration.transient_periods to leave it out"
+
+
+def contact_lines(stretches: "Sequence[ContactStretch]") -> Iterator[str]:
+    """Return lines for the kinds of contact of every clearance over the swept values."""
+    for element, some in groupby(stretches, attrgetter("element")):
+        all_of = [*some]
+        texts = [f"{one.contact} {_range(one.start, one.end)}" for one in all_of[:MOST_STRETCHES]]
+        if len(all_of) > MOST_STRETCHES:
+            texts += [f"{len(all_of) - MOST_STRETCHES} more (--json lists all)"]
+        yield from textwrap.wrap(f"contact, {element}: {'; '.join(texts)}", WIDTH)
+
+
+def _range(start: float, end: float) -> str:
+    """Return a stretch of values as text."""
+    return f"{start:.6g} to {end:.6g}" if start < end else f"at {start:.6g}"
 
 
 def directions_apart(stretches: "Sequence[Apart]") -> Iterator[str]:

@@ -319,6 +319,7 @@ class System:
         ((6,), (6,))
         """
         period = whole_number("period", period, least=1)
+        settled = guess is None
         if guess is None:
             repeats = self.repeats_after
             transient = repeats * max(-(-self.config.integration.transient_periods // repeats), 1)
@@ -328,9 +329,9 @@ class System:
             self._record, checked_state("guess", guess, self.states), periods, self._plan
         )
         if not found.converged[0]:
+            where = "where the motion has settled" if settled else "next to the guess"
             raise ConfigurationError(
-                f"{self.config.source}: no orbit of period {period} "
-                "next to the guess; give "
+                f"{self.config.source}: no orbit of period {period} {where}; give "
                 "another period or guess, or a longer integration.transient_periods"
             )
         return self._orbit(found, period, self._record)

@@ -106,6 +106,8 @@ class CsvText:
     def _cells(self, name: object) -> list[tuple[int, str]]:
         """Return line and text of the cells of a column, without empty ones at its end."""
         if name not in self.headings:
+            if not self.headings:
+                raise ValueError("is empty", "give a line of headings and the rows below it")
             asked = "column is missing" if name is None else f"has no column {shown(name)}"
             # Content is never quoted: the path may lead to any file of this machine.
             raise ValueError(asked, "name one of its headings; capitals count")
@@ -127,7 +129,8 @@ class CsvText:
                 raise ValueError(f"{rule}headings", remedy)
             text = cell.replace(",", ".") if self._decimal_comma else cell
             if not (NUMBER.fullmatch(text) and isfinite(float(text))):
-                rule = f"line {line}, column {name}: must be a finite number"
+                found = "" if text else ", and the cell is empty"
+                rule = f"line {line}, column {name}: must be a finite number{found}"
                 mark = "a point or a comma" if self._decimal_comma else "a point"
                 raise ValueError(rule, f"give one for every {whose}, decimals with {mark}")
             yield float(text)

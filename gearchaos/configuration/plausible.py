@@ -163,7 +163,7 @@ def _warning(path: str, usual: Plausible, value: Any) -> Iterator[str]:
         probable = shown(meant if len(meant) > 1 else meant[0])
         found += f"; probably it is in {unit}: then write {probable}"
     found += f"; {usual.mistake}" if usual.mistake else ""
-    yield f'{found}; if it is meant, unusual = ["{path}"] leaves this warning out'
+    yield f'{found}; if it is intended, add unusual = ["{path}"] to leave this warning out'
 
 
 def _numbers(value: Any) -> list[float]:

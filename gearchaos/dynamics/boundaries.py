@@ -44,8 +44,11 @@ from gearchaos.records.branch import FOLD, GRAZING, NEIMARK_SACKER, PERIOD_DOUBL
 LOCATED, MOST_TRIALS = 1e-10, 60
 """Length of the stretch in which a point of codimension 2 is located, and the most trials."""
 
-NEAR, SAME_PLACE = 0.05, 1e-6
-"""Distance from a boundary up to which a point is compared, and that of the same point."""
+NEAR, SAME_PLACE, SAME_POINT = 0.05, 1e-6, 1e-5
+"""Distance from a boundary up to which a point is compared, and that of the same point.
+
+The last one is that of boundaries of one point, which is located less accurately.
+"""
 
 TESTS = {
     FOLD: (CUSP, STRONG_RESONANCE_11, FOLD_FLIP, FOLD_NEIMARK_SACKER),
@@ -113,6 +116,8 @@ class TracedBoundary(NamedTuple):
 
     def holding(self, start: OnBoundary) -> Following[bool]:
         """Search whether a point of the same kind, period and flank lies on the boundary."""
+        if self.is_at(start.place):
+            return True
         states = self.equations.scale.size
         for state in start.section / self.equations.scale:
             place = np.append(state, start.place[states:])
@@ -127,6 +132,11 @@ class TracedBoundary(NamedTuple):
             if found is not None and np.linalg.norm(found.place - place) < SAME_PLACE:
                 return True
         return False
+
+    def is_at(self, place: Floats) -> bool:
+        """Whether the boundary has no other point than one at a place (states + 2,)."""
+        alone = len(self.points) == 1
+        return bool(alone and np.linalg.norm(self.places[0] - place) < SAME_POINT)
 
     def passes(self, place: Floats) -> bool:
         """Whether the boundary comes closer to a place (states + 2,) than `NEAR`."""

@@ -106,7 +106,8 @@ def _swept_axes(result: Result, name: str) -> list[str]:
     if {*result.axes} != {*swept, known.START} or len(swept) > 1:
         raise ConfigurationError(
             f"{name}: has the axes {', '.join(result.axes)}; basins are those of several starts "
-            'over one parameter: set start.kind = "grid" or start.count, fix others with sel (--at)'
+            'over one parameter: set start.kind = "grid" or start.count, and '
+            "choose a value of every other axis with --at"
         )
     return swept
 

@@ -126,6 +126,8 @@ def find_boundaries(
                 found = count_of(len(search.boundaries.found), "boundary", "boundaries")
                 say(f"{count_of(len(some), 'line')}: {traced}; {found}")
             search.from_changes()
+            found = count_of(len(search.boundaries.found), "boundary", "boundaries")
+            say(f"with the changes that were left: {found}")
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{searched} of {len(places)} lines were searched")
             if keep is not None and search.boundaries.found:

@@ -81,7 +81,7 @@ class KnownBoundaries:
         begun = run(together(searches), self.answers)
         new = self._unknown(begun)
         for one in begun:
-            if one.start is None and one.special is not None:
+            if one.start is None and one.special is not None and not self._is_at(one):
                 self.found.append(unstarted(one.equations, one.guess, one.special))
         before = len(self.found)
         turning = [one for one in new if one.equations.kind == NEIMARK_SACKER]
@@ -126,6 +126,12 @@ class KnownBoundaries:
             if (yield from one.holding(begun.start)):
                 return True
         return False
+
+    def _is_at(self, begun: Begun) -> bool:
+        """Whether the special point of a branch is the only point of a known boundary."""
+        return any(
+            one.is_at(begun.guess) and _alike(one.equations, begun.equations) for one in self.found
+        )
 
     def _turning(self, boundaries: list[TracedBoundary]) -> list[Begun]:
         """Return points of curves of pairs with the product 1, at resonances on boundaries."""

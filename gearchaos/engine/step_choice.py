@@ -220,8 +220,8 @@ def _sensitive_ones(verdict: Verdict) -> str:
     if not count:
         return ""
     return (
-        f"; in {count} of them any error grows more than {AMPLIFIED:g} times within these periods: "
-        "their path depends on the step, averages over it do not"
+        f"; in {count} of them any error grows more than {AMPLIFIED:g} times within these periods, "
+        "as in chaos: with other steps their states differ, while averages over them do not"
     )
 
 

@@ -35,6 +35,7 @@ from gearchaos.figures.response import forces_of
 from gearchaos.figures.style import GREY, VERMILION
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS
 from gearchaos.outputs.names import (
+    CONVERTED,
     LABELS,
     LARGEST_EXPONENT,
     ORDER,
@@ -511,7 +512,9 @@ class _PageOverlay:
         if self.overlaid is None:
             return None
         try:
-            if units == "physical":
+            # Boundaries lie over the parameters of the map. Most parameters keep their units.
+            kept = self.name == "boundaries" and CONVERTED not in result.metadata
+            if units == "physical" and not kept:
                 raise FigureError(f"{self.name} are drawn in dimensionless units only")
             over = self.overlaid.over(result, variable)
         except FigureError as error:

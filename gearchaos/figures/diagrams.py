@@ -177,6 +177,12 @@ def diagram_variables(result: Result) -> list[str]:
 def _diagram_variable(result: Result, variable: str | None) -> str:
     """Check the variable of a diagram, or return the default."""
     variable = variable or next(iter(section_variables(result)), DEFAULT_VARIABLE)
+    kinds = result.variables[variable].flags if variable in result.variables else ()
+    if kinds:
+        raise FigureError(
+            f"{variable}: has kinds ({', '.join(kinds)}), and a diagram draws numbers; "
+            "gearchaos stages lists the values of each kind, and a map of two parameters draws them"
+        )
     check_variable(variable, diagram_variables(result), "of the diagram")
     return variable
 

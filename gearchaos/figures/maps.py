@@ -22,12 +22,9 @@ from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import legend_entries, robust_limits
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
-from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, STATUS
+from gearchaos.outputs.names import CONTACT_STATE, LABELS, LARGEST_EXPONENT, STATUS
 from gearchaos.results.reading.ensembles import motion_kinds
 from gearchaos.results.reading.result import Result
-
-CONTACT_STATE = "contact_state_"
-"""Beginning of the names of contact states; the name of an element follows."""
 
 MOST_SHOWN = 4
 """Largest number of maps on a page where none is chosen."""

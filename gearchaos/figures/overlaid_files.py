@@ -8,7 +8,7 @@ from typing import Any
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FigureError
 from gearchaos.figures.lanes import map_axes
-from gearchaos.outputs.names import axis_name
+from gearchaos.outputs.names import CONVERTED, axis_name
 from gearchaos.results.files.boundary_file import BoundarySet
 from gearchaos.results.files.boundary_reader import read_boundaries
 from gearchaos.results.files.branch_file import BranchSet
@@ -67,10 +67,12 @@ def boundaries_over(path: str | Path, result: Result, units: str | None = None) 
             f"{' and '.join(axes)}; give the boundaries of this map"
         )
     _require_same_machine(f"--boundaries {path}", found.metadata, result)
-    if units == "physical":
+    shown = result.physical() if units == "physical" else result
+    if converted := shown.metadata.get(CONVERTED):
+        axes_of_map = " and ".join(str(converted).split())
         raise FigureError(
-            "--boundaries: the curves are over the swept parameters as configured; leave --units "
-            "physical out, or the boundaries"
+            f"--boundaries: the curves are over {axes_of_map} as configured, "
+            "and --units physical draws other units; leave it out, or the boundaries"
         )
     return found
 

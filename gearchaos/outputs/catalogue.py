@@ -96,7 +96,7 @@ MOTION_PART = Part(
         ),
         Output(
             names.BANDS,
-            "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions",
+            "number of bands that a chaotic or quasi-periodic section visits in turn, 0 otherwise",
             dtype="int32",
             fill_value=None,
         ),

@@ -38,6 +38,9 @@ CROSSINGS = "crossings_per_period"
 STATUS = "status"
 MESH_PERIOD = "mesh_period"
 
+CONTACT_STATE = "contact_state_"
+"""Beginning of the names of kinds of contact; the name of an element follows."""
+
 # Metadata.
 CONVERTED = "converted_axes"
 

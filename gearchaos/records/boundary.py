@@ -62,9 +62,9 @@ POINT_MEANINGS = {
 """Event at each kind of point of codimension 2."""
 
 CORNER = "meets a grazing, where it has a corner"
-NO_EXTREME = "the gap has no extreme near the flank any more"
+NO_EXTREME = "beyond this point no extreme of the gap comes near the flank"
 SHORT_STEPS = "its steps became too short, as next to a grazing"
-NOT_STARTED = "the special point of a branch is no point of a boundary"
+NOT_STARTED = "no boundary could be followed from this special point of a branch"
 BOUNDARY_ENDS = (
     EDGE,
     CLOSED_CURVE,

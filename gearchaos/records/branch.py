@@ -43,8 +43,8 @@ def digits_of(metadata: Mapping[str, Any]) -> list[str]:
         return []
     steps = int(metadata["steps_per_period"])
     return [
-        f"these are orbits of RK4 with {steps} steps per period; next to grazings fewer digits "
-        f"hold than are printed: compare with integration.steps_per_period = {2 * steps}"
+        f"these are orbits of RK4 with {steps} steps per period; near grazings the last "
+        f"printed digits are not reliable: compare with integration.steps_per_period = {2 * steps}"
     ]
 
 

@@ -20,7 +20,15 @@ from gearchaos.figures import (
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.page import Page
 from gearchaos.figures.response import is_response
-from gearchaos.outputs.names import DIRECTION, LABELS, REPEATS, START, STATUS, coordinate_text
+from gearchaos.outputs.names import (
+    DIRECTION,
+    LABELS,
+    REPEATS,
+    SECTION_POINT,
+    START,
+    STATUS,
+    coordinate_text,
+)
 from gearchaos.reporting import markup
 from gearchaos.results.reading.basin_units import physical_basins
 from gearchaos.results.reading.ensembles import Basins, motion_shares
@@ -50,8 +58,7 @@ DIAGRAM = (
 )
 ONE_POINT = "One point means period 1, n points period n"
 POINTS_OF_EXCITATION = (
-    "With period 1 it has {n} points, one for each mesh period of the excitation, with period n it "
-    "has n times as many"
+    "Pitch errors repeat after {n} mesh periods, and the figure shows one point for each of {shown}"
 )
 SHARES = "Shares of motions among all gear pairs and starts at each value, and of contact loss"
 BASINS = "Basins of attraction: the attractor that each start leads to"
@@ -171,7 +178,9 @@ def _pages(one: Result, found: Basins | None) -> Pages:
 def _diagram_caption(one: Result) -> str:
     """Return the caption of a bifurcation diagram."""
     n = excitation_of(one.metadata).excitation_period
-    return DIAGRAM.format(points=POINTS_OF_EXCITATION.format(n=n) if n > 1 else ONE_POINT)
+    shown = min(n, one[SECTION_POINT].size if SECTION_POINT in one else n)
+    points = POINTS_OF_EXCITATION.format(n=n, shown="them" if shown == n else f"the last {shown}")
+    return DIAGRAM.format(points=points if n > 1 else ONE_POINT)
 
 
 def _largest_loads(one: Result) -> list[str]:

@@ -1,5 +1,7 @@
 """Contact outputs of a lane: names, states in words, and when they can be reported."""
 
+import json
+
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan
@@ -77,6 +79,27 @@ def test_a_sweep_reports_the_contact_of_both_directions_and_its_file_keeps_it(tm
     for name in names:
         assert np.array_equal(kept[name], result[name], equal_nan=True), name
     assert kept.variables["contact_state_tangential"].flags == CONTACT_STATES
+
+
+def test_the_stages_list_the_values_of_each_kind_of_contact(tmp_path):
+    result = gearchaos.run(load_config(PAN2021, [*SHORT, *ASKED]))
+    result.save(tmp_path / "contact.h5")
+    done = run_module("gearchaos.stages", "contact.h5", "--json", cwd=tmp_path)
+    listed = json.loads(done.out)["contact"]
+    for way in WAYS:
+        of_lanes = []
+        for one in (one for one in listed if one["element"] == way):
+            # The stretches follow each other, and begin and end at values of the sweep.
+            first, last = len(of_lanes), len(of_lanes) + one["lanes"] - 1
+            ends = result["pitch_error"][[first, last]].tolist()
+            assert [one["start"], one["end"]] == ends
+            of_lanes += one["lanes"] * [one["contact"].replace(" ", "_")]
+        states = result[f"contact_state_{way}"]
+        assert of_lanes == [CONTACT_STATES[state] for state in states]
+    table = run_module("gearchaos.stages", "contact.h5", cwd=tmp_path).out
+    assert f"contact, tangential: {listed[0]['contact']}" in table
+    with pytest.raises(gearchaos.FigureError, match=r"has kinds \(held, .*a diagram draws numbers"):
+        bifurcation(Figure().add_subplot(), result, "contact_state_tangential")
 
 
 def test_what_is_reported_of_each_lane_can_be_drawn_over_the_parameter():

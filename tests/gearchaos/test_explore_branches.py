@@ -74,7 +74,22 @@ def folder(tmp_path_factory) -> Path:
     of = (values, branch.arclength, branch.section, branch.multipliers, (cusp,), (EDGE, EDGE))
     found = BoundarySet(tuple(swept), states, (Boundary(FOLD, 1, "", *of),), {})
     write_boundaries(folder / "boundaries.h5", found)
+    speeds = (*ASKED, LOAD.replace("load", "mesh_frequency"), "start.carry='none'")
+    result = gearchaos.run(gearchaos.load_config(small_config(folder), speeds))
+    result.save(folder / "speeds.h5")
+    over = tuple(result.variables[name] for name in ("pitch_error", "mesh_frequency"))
+    write_boundaries(folder / "over_speed.h5", found._replace(parameters=over))
     return folder
+
+
+def test_boundaries_are_drawn_in_physical_units_where_the_axes_keep_theirs(folder):
+    words = ("--boundaries", "boundaries.h5", "--units", "physical", "-o", "physical.png")
+    done = run_module("gearchaos.plot", "map.h5", *words, cwd=folder)
+    assert (done.code, (folder / "physical.png").stat().st_size > 10_000) == (0, True)
+    words = ("--boundaries", "over_speed.h5", "--units", "physical", "-o", "refused.png")
+    done = run_module("gearchaos.plot", "speeds.h5", *words, cwd=folder)
+    assert done.code and not (folder / "refused.png").exists()
+    assert "the curves are over mesh_frequency as configured" in done.err
 
 
 def glyphs(page, kind: str, column: str = "y") -> list:
@@ -207,7 +222,7 @@ def test_the_page_draws_branches_and_a_link_remembers_the_switch(folder):
         ("sweep.h5", "--branches", "missing.h5"),
         ("map.h5", "--boundaries", "branches.h5"),
         ("sweep.h5", "--branches", "branches.h5", "--units", "physical"),
-        ("map.h5", "--boundaries", "boundaries.h5", "--units", "physical"),
+        ("speeds.h5", "--boundaries", "over_speed.h5", "--units", "physical"),
         ("other.h5", "--branches", "branches.h5"),
     ],
 )

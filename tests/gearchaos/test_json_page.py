@@ -10,12 +10,13 @@ import pytest
 from gearchaos.controlling.trial import facts_of
 from gearchaos.engine.recomputing import Survival
 from gearchaos.engine.refinement import Boundary
+from gearchaos.results.reading.contact_stretches import ContactStretch
 from gearchaos.results.reading.jumps import Apart, Crisis, Jump
 
 from .commands import run_module, small_config
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
-OPTIONAL = {"directions_apart", "boundaries", "zero_one"}
+OPTIONAL = {"directions_apart", "boundaries", "contact", "zero_one"}
 OPTIONAL |= {"free_eigenfrequencies", "free_eigenfrequencies_Hz"}
 """Keys of options and models that the sweep below does not use."""
 
@@ -81,6 +82,7 @@ def test_the_page_lists_the_keys_that_are_printed(answers, heading):
     [
         ("jumps[]", Jump),
         ("crises[]", Crisis),
+        ("contact[]", ContactStretch),
         ("survival", Survival),
         ("directions_apart[]", Apart),
         ("boundaries[]", Boundary),

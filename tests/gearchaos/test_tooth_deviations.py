@@ -197,7 +197,7 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
 ROWS = "Fp\n" + "".join(f"{f}\n" for f in F)
 FAULTY_FILES = {
     "no column": ("p\n1\n", 'has no column "Fp"; name one of its headings; capitals count'),
-    "nothing": ("# note\n", "name one of its headings; capitals count"),
+    "nothing": ("# note\n", "is empty; give a line of headings and the rows below it"),
     "text": (ROWS.replace("4.0", "four"), "line 3, column Fp: must be a finite number; give"),
     "nan": (ROWS.replace("4.0", "nan"), "line 3, column Fp: must be a finite number; give"),
     "inf": (
@@ -224,8 +224,8 @@ FAULTY_FILES = {
     ),
     "short row": (
         "x;Fp\n1;0.0\n\n2\n3;1.0\n",
-        "line 4, column Fp: must be a finite number; give one for every tooth, decimals with a "
-        "point or a comma",
+        "line 4, column Fp: must be a finite number, and the cell is empty; give one for every "
+        "tooth, decimals with a point or a comma",
     ),
     "missing tooth": (ROWS.replace("4.0\n", ""), "gear.csv, column Fp: holds 4 values for 5 teeth"),
     "binary": (

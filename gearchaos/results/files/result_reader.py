@@ -1,6 +1,7 @@
 """Reading and verifying a result file; any other file is refused with one sentence."""
 
 import os
+import re
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -104,14 +105,23 @@ def _opened(path: str | os.PathLike[str], in_full: bool) -> Iterator[tuple[h5py.
         if not h5py.is_hdf5(name):
             remedy = "give the name of a result, which a sweep of a configuration writes"
             raise FileError(f"{name}: is not an HDF5 file; {remedy}") from error
-        why = printable(reason(error))
-        raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
+        raise FileError(f"{name}: {_damage(error)}; run the sweep again") from error
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is malformed."""
     pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
     return {name: float(value) for name, _, value in pairs}
+
+
+def _damage(error: Exception) -> str:
+    """Return how a file is damaged, from the error of h5py."""
+    why = reason(error)
+    cut = re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", why)
+    if cut is not None:
+        found, wanted = map(int, cut.groups())
+        return f"is cut off after {found:,} of {wanted:,} bytes"
+    return f"is damaged ({printable(why)})"
 
 
 def printable(text: str) -> str:

@@ -129,8 +129,8 @@ def labelled_lanes(
     one = result.sel(**{axis: result[axis][0] for axis in REPEATS if repeats and axis in result})
     if len(one.axes) != 1:
         raise ConfigurationError(
-            f"{name}: has {len(one.axes)} axes ({', '.join(one.axes)}), stages lie along "
-            "one; fix the others with sel (--at)"
+            f"{name}: has {len(one.axes)} axes ({', '.join(one.axes)}), and stages lie along "
+            "one; choose a value of every other axis with --at"
         )
     motion, period = one["motion"].tolist(), one["period"]
     meanings = result.variables["motion"].flags
