@@ -111,7 +111,7 @@ def _result(source: Path) -> "Result":
 
 def table(found: "BoundarySet") -> list[str]:
     """Return the curves with their points of codimension 2 as lines of a table."""
-    from gearchaos.records.branch import digits_of
+    from gearchaos.records.branch import notes_of
 
     names = [one.name for one in found.parameters]
     lines = []
@@ -135,7 +135,7 @@ def table(found: "BoundarySet") -> list[str]:
             lines.append(f"  {point.kind:35} {place}")
     if not lines:
         return ["no boundary starts from the map or on these lines; give more with --lines"]
-    return [*lines, *digits_of(found.metadata)]
+    return [*lines, *notes_of(found.metadata)]
 
 
 main = Command("boundaries", __doc__, BoundariesOptions, _boundaries).start(__name__)

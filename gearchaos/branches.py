@@ -100,7 +100,7 @@ def _result(source: Path) -> "Result":
 
 def table(found: "BranchSet") -> list[str]:
     """Return the branches with their special points as lines of a table."""
-    from gearchaos.records.branch import digits_of
+    from gearchaos.records.branch import notes_of
 
     name = found.parameter.name
     lines = []
@@ -117,7 +117,7 @@ def table(found: "BranchSet") -> list[str]:
         ]
     if not lines:
         return ["no periodic motion to follow"]
-    return [*lines, *digits_of(found.metadata)]
+    return [*lines, *notes_of(found.metadata)]
 
 
 main = Command("branches", __doc__, BranchesOptions, _branches).start(__name__)

@@ -33,7 +33,7 @@ from gearchaos.dynamics.exponents import (
     sum_of_exponents,
 )
 from gearchaos.dynamics.following import Branch, Followed, Orbit, follow
-from gearchaos.dynamics.orbits import Orbits, polish
+from gearchaos.dynamics.orbits import Orbits, exponents_of, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import NOT_LOST, STABILITY_LOSS_TEXTS, StabilityLoss
@@ -694,14 +694,12 @@ class System:
 
     def _orbit(self, found: Orbits, period: int, system: kernels.LaneSystem) -> Orbit:
         """Return the orbit of the only lane of a system."""
-        # The multipliers of a long orbit may be smaller than the smallest number.
-        with np.errstate(divide="ignore"):
-            growth = np.log(np.abs(found.multipliers[0, 0]))
+        exponents = exponents_of(system, self._plan, found.points, found.multipliers, period)
         return Orbit(
             period,
             found.points[0],
             found.multipliers[0],
-            float(growth / (period * system.excitation_period[0])),
+            float(exponents[0]),
             float(found.residual[0]),
         )
 

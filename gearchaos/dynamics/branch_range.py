@@ -9,6 +9,7 @@ from gearchaos_kernels import METHODS, LaneSystem, Plan, steps_taken
 from gearchaos.arrays import Floats, Integers
 from gearchaos.dynamics.arclength import Curve
 from gearchaos.dynamics.curve_defects import DIFFERENCE
+from gearchaos.records.branch import LONGEST_GRAZING
 
 LANES_AHEAD, MOST_AHEAD = 64, 4
 """About how many lanes may search the points ahead of one, and the largest number of points."""
@@ -91,7 +92,7 @@ class BranchRange(NamedTuple):
         whole = period * self.system_at(np.zeros(1)).repeats_after
         along = only_map_parameter(self.system_at(PLACES)) if own_maps else -1
         plan = plan._replace(steps_per_period=steps).over(whole)
-        plan = plan._replace(contact=True, interpolated=along)
+        plan = plan._replace(contact=whole <= LONGEST_GRAZING, interpolated=along)
         ahead = min(max(ahead, 1), MOST_AHEAD)
         beside = self._difference()
         return Curve(self.systems_at, self.number, plan, period, scale, ahead, own_maps, beside)

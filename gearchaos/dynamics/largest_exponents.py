@@ -13,7 +13,7 @@ from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 
 UNIFORM, MIXED, NOT_COMPARED = 0, 1, 2
-RECORD_MEANINGS = ("uniform", "mixed", "not_told")
+RECORD_MEANINGS = ("uniform", "mixed", "unknown")
 """Meanings of the values of ``record``."""
 
 

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Counts, Floats, Integers, Mask
 from gearchaos.dynamics.period_maps import PeriodMaps
@@ -221,3 +221,25 @@ def _repeats_earlier(section: Floats, points: Floats, scale: Floats, period: Cou
         returned = section[lanes, divisor - 1 - period[lanes]]
         repeats[lanes] |= _distance(returned, points[lanes], scale[lanes]) <= TOLERANCE
     return repeats
+
+
+def exponents_of(
+    system: LaneSystem, plan: Plan, points: Floats, multipliers: Complex, period: int
+) -> Floats:
+    """Return the largest Lyapunov exponent of orbits of one period, per unit of tau, (lanes,).
+
+    ``points`` (lanes, states): their states at mesh phase 0; ``multipliers`` (lanes, states):
+    largest modulus first. Where the multipliers of long orbits are smaller than the smallest
+    number, a tangent vector is followed instead.
+    """
+    size, duration = np.abs(multipliers[:, 0]), period * system.excitation_period
+    with np.errstate(divide="ignore"):
+        found: Floats = np.log(size) / duration
+    (vanished,) = np.nonzero(size == 0.0)
+    if vanished.size:
+        whole = period * system.repeats_after
+        # During the first turn the vector takes the direction that decays most slowly.
+        turns = plan.over(whole, whole)._replace(tangent=True)
+        growth = integrate(system.of(vanished), points[vanished], turns).growth
+        found[vanished] = growth.sum(axis=1) / duration[vanished]
+    return found

@@ -31,6 +31,7 @@ from gearchaos.records.branch import (
     BRANCH_POINT,
     FOLD,
     GRAZING,
+    LONGEST_GRAZING,
     NEIMARK_SACKER,
     PERIOD_DOUBLING,
 )
@@ -270,7 +271,8 @@ class _BoundarySearch:
         axes = [known.axis_name(one) for one in self.over.parameters]
         ends = np.array([self.over.low, self.over.high])
         impacts = [f"impacts_{side}_{element}" for element in self.run.elements for side in SIDES]
-        if any(name not in result.variables for name in impacts):
+        long = self.run.lanes.repeats_after > LONGEST_GRAZING
+        if long or any(name not in result.variables for name in impacts):
             impacts = []
         self.left = changes_of(result, axes, ends, self.longest, impacts)
         say(f"{len(self.left.flank)} changes of the map")

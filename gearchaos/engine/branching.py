@@ -19,6 +19,7 @@ from gearchaos.dynamics.branches import (
     tracing,
 )
 from gearchaos.dynamics.curve_defects import Finding, defects_of
+from gearchaos.dynamics.orbits import exponents_of
 from gearchaos.dynamics.side_by_side import counting, run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.method_choice import for_continuation
@@ -349,14 +350,15 @@ def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> P
     points, shares = branch.points, branch.places[:, -1]
     system = over.system_at(shares)
     multipliers = np.array([one.multipliers for one in points])
-    duration = branch.period * system.excitation_period
     return PeriodicBranch(
         branch.period,
         over.value(shares),
         branch.positions,
         np.array([one.section for one in points]),
         multipliers,
-        np.log(np.abs(multipliers[:, 0])) / duration,
+        exponents_of(
+            system, run.plan, branch.places[:, :-1] * branch.curve.scale, multipliers, branch.period
+        ),
         tuple(
             SpecialPoint(
                 one.kind,

@@ -17,6 +17,7 @@ from gearchaos.figures.panel import legend_above, legend_entries, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
 from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, ORDER, WAYS
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.jumps import apart, directions_of
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import LabelledLanes
@@ -109,6 +110,12 @@ class _Overlay:
         return any(name in one and one.dims(name)[-1] == ORDER for one in self.results)
 
     @property
+    def of_section(self) -> bool:
+        """Whether section points are drawn."""
+        sections = {name for one in self.results for name in section_variables(one)}
+        return bool(sections) if self.variable is None else self.variable in sections
+
+    @property
     def panels(self) -> int:
         """Number of panels."""
         # A requested variable that is missing is an error, not a page without its panel.
@@ -170,7 +177,10 @@ def _draw(
         for axes in stack:
             shade_stages(axes, results[0], lanes=given, legend=axes is stack[0])
     else:
-        footnote(figure, max(map(form_in_words, results)))
+        words = [max(map(form_in_words, results))]
+        if overlay.of_section:
+            words.append(max(excitation_of(one.metadata).points_in_words for one in results))
+        footnote(figure, "\n".join(filter(None, words)))
     places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
     if places:
         figure.suptitle("; ".join(places))

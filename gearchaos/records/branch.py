@@ -34,18 +34,33 @@ STEPPED = "rk4"
 """The method whose orbits depend on its steps."""
 
 
-def digits_of(metadata: Mapping[str, Any]) -> list[str]:
-    """Return what a table of special points says of their digits: nothing for an exact method.
+LONGEST_GRAZING = 100
+"""Most mesh periods of an orbit whose grazings are looked for.
 
-    ``metadata``: that of the branches or boundaries, with ``method`` and ``steps_per_period``.
+Longer ones, as of teeth with errors of their own, graze a flank at nearly every value.
+"""
+
+
+def notes_of(metadata: Mapping[str, Any]) -> list[str]:
+    """Return the notes below a table of special points.
+
+    ``metadata``: that of the branches or boundaries, with ``method``, ``steps_per_period`` and
+    ``excitation_period``.
     """
-    if metadata.get("method") != STEPPED:
-        return []
-    steps = int(metadata["steps_per_period"])
-    return [
-        f"these are orbits of RK4 with {steps} steps per period; near grazings the last "
-        f"printed digits are not reliable: compare with integration.steps_per_period = {2 * steps}"
-    ]
+    notes, repeats = [], int(metadata.get("excitation_period", 1))
+    if repeats > LONGEST_GRAZING:
+        notes.append(
+            f"an orbit has {repeats} mesh periods or more: its grazings are not looked for, since "
+            "it grazes a flank at nearly every value"
+        )
+    if metadata.get("method") == STEPPED:
+        steps = int(metadata["steps_per_period"])
+        notes.append(
+            f"these are orbits of RK4 with {steps} steps per period; near grazings the last "
+            "printed digits are not reliable: compare with integration.steps_per_period = "
+            f"{2 * steps}"
+        )
+    return notes
 
 
 class SpecialPoint(NamedTuple):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.dynamics.orbits import exponents_of
 from gearchaos.dynamics.stability_loss import StabilityLoss
 from gearchaos.models.gear_pair.scene import STATES
 
@@ -105,6 +106,16 @@ def test_the_exponent_of_a_followed_orbit_is_that_of_the_period_at_its_value():
     there = end.orbit(guess=branch.orbit.point)
     assert branch.orbit.exponent == pytest.approx(there.exponent, rel=1e-9)
     assert there.exponent == pytest.approx(np.log(abs(there.multipliers[0])) * 1.1 / (2.0 * np.pi))
+
+
+def test_an_orbit_whose_multipliers_vanish_has_the_exponent_of_a_tangent_vector(doubled):
+    orbit, turns = doubled.orbit(period=2), 200
+    lanes = doubled.equations.of(np.zeros(2, dtype=int))
+    points = np.tile(orbit.point, (2, 1))
+    multipliers = np.array([orbit.multipliers**turns, 0.0 * orbit.multipliers])
+    found = exponents_of(lanes, doubled.plan, points, multipliers, 2 * turns)
+    assert found[0] == pytest.approx(orbit.exponent, rel=1e-9)
+    assert found[1] == pytest.approx(orbit.exponent, rel=0.02)
 
 
 def test_exponents_of_a_linear_system_add_up_to_what_its_damping_says(linear):

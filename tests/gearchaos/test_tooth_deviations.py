@@ -16,6 +16,8 @@ from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
 from gearchaos.models import Configuration, load_config
 from gearchaos.models.gear_pair.tables import groups_at
 from gearchaos.models.gear_pair.tooth_deviations import drawn_gears, tooth_deviations
+from gearchaos.results.reading.result import open_result
+from gearchaos.results.reading.settings import settings_of
 
 from .commands import SMALL, run_module
 from .fuzz_results import CHECKSUM_LINE, good_result
@@ -186,6 +188,13 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
     shown = run_module("gearchaos.info", "gears.h5", cwd=tmp_path)
     assert 'pitch_error.driving.file = "gear.csv"\n' in shown.out
     assert "sweep.count = 2 (set for this run)" in shown.out
+    listed = " ".join(shown.out.split())
+    assert (
+        "pitch_error.driving.cumulative_um = [0.0, 4.0, 1.0, -2.0, -1.0] (from gear.csv)" in listed
+    )
+    facts = open_result(tmp_path / "gears.h5").metadata
+    raised = {one.key: one.origin for one in settings_of({**facts, "transient_periods": 190})}
+    assert raised["integration.transient_periods"] == "190 were computed"
     onwards = ("gears.h5", "--at", "5.0", "--periods", "2")
     assert run_module("gearchaos.response", *onwards, cwd=tmp_path).code == 0
     # To read the configuration again, the file is necessary.

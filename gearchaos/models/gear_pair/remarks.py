@@ -119,10 +119,10 @@ def _parting_pairs(system: GearPairs, length_um: Floats | None) -> str:
     )
     return (
         f"in {parting.mean():.0%} of the lanes tooth pairs that share the load differ by up to "
-        f"{worst:.3g} {unit}, more than the static deflection there ({below:.3g} {unit} at least); "
-        "single pairs may then part while the others carry, which the model leaves out: raise "
-        "operation.torque_Nm or groups.load, or take gears of a finer grade, and do not rely on "
-        "the loads of these lanes"
+        f"{worst:.3g} {unit}, and the static deflection there is {below:.3g} {unit} at the least; "
+        "a pair may then part while others carry, which the model leaves out: do not rely on the "
+        "loads of these lanes; at a higher operation.torque_Nm or groups.load, or with gears of a "
+        "finer grade, all pairs stay together"
     )
 
 

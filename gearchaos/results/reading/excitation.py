@@ -30,6 +30,12 @@ class Excitation(NamedTuple):
         n = self.excitation_period
         return f"periods are those of the excitation, {n} mesh periods each" if n > 1 else ""
 
+    @property
+    def points_in_words(self) -> str:
+        """A sentence on the points of a section; empty where each period has one."""
+        n = self.excitation_period
+        return f"the excitation repeats after {n} mesh periods: period 1 has {n} points" * (n > 1)
+
 
 def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
     """Read the excitation from the metadata of a result; invalid values count as unknown."""
