@@ -188,6 +188,7 @@ MEASURES = {
 """Names of the outputs that are compared, in words."""
 
 OF_ELEMENTS = {
+    "mesh_force_largest_": "largest mesh force, {}",
     "time_apart_": "share of the time apart, {}",
     "force_largest_": "largest force, {}",
     "gap_peak_to_peak_": "gap, peak to peak, {}",
@@ -223,13 +224,13 @@ def table(facts: dict[str, Any], periods: str) -> list[str]:
     ]
     if facts["captured"]:
         lines += [f"once captured {_effort(facts, 'final_effort')}"]
-    lines += [
-        "means over the starts, lengths and forces in the units of the equations:",
-        f"{'':42} before   after",
-    ]
+    physical = any(unit != "1" for unit in facts["units"].values())
+    of = "" if physical else ", lengths and forces in the units of the equations"
+    lines += [f"means over the starts{of}:", f"{'':42} before   after"]
     for name, value in facts["before"].items():
-        words = _measure(name)
+        words, unit = _measure(name), facts["units"][name]
         if words and name in facts["after"]:
+            words += f" ({unit})" * (unit != "1")
             lines += [f"  {words:40} {value:<8.4g} {facts['after'][name]:.4g}"]
     return lines
 

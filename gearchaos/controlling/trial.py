@@ -1,5 +1,6 @@
 """Try a controller from many starts: its capture, its effort, and what it changes."""
 
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import gearchaos_kernels as kernels
@@ -7,13 +8,16 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.controlling.controller import Controller
+from gearchaos.engine.kept import variables_of
 from gearchaos.engine.run_plan import plan_run
+from gearchaos.errors import ConfigurationError
 from gearchaos.figures.control import ControlDrawing
 from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.outputs.listing import Catalogue
 from gearchaos.records.contact import contact_summary
 from gearchaos.records.control import ControlledMotion
 from gearchaos.records.wilson import wilson_interval
+from gearchaos.results.reading.physical_units import in_physical_units
 
 COMPARED_PERIODS = 200
 """Mesh periods over which motions with and without control are compared."""
@@ -35,7 +39,9 @@ class ControlTrial(NamedTuple):
         The last mesh periods of a motion without control, and of one with it.
     before, after : dict of str to float
         Means over all starts of contact, loads and transmission error, without control and after
-        the trial.
+        the trial; in physical units where the configuration determines them.
+    units : dict of str to str
+        The unit of each of these means, "1" for a pure number.
     """
 
     controller: Controller
@@ -44,6 +50,7 @@ class ControlTrial(NamedTuple):
     held: Floats
     before: dict[str, float]
     after: dict[str, float]
+    units: dict[str, str]
 
     def drawing(self) -> ControlDrawing:
         """Return the contents of a page about the trial.
@@ -120,14 +127,10 @@ def try_controller(controller: Controller, starts: int, periods: int) -> Control
     held = kernels.integrate(
         controlled.of(best), begin[best], plan._replace(transient_periods=tried)
     )
-    return ControlTrial(
-        controller,
-        motion,
-        free.history[0],
-        held.history[0],
-        _measures(controller, alone, begin, 0),
-        _measures(controller, controlled, begin, tried),
-    )
+    before = _measures(controller, alone, begin, 0)
+    after = _measures(controller, controlled, begin, tried)
+    units = _to_physical_units(controller, before, after)
+    return ControlTrial(controller, motion, free.history[0], held.history[0], before, after, units)
 
 
 def _measures(
@@ -158,6 +161,26 @@ def _measures(
         for name, values in found.items()
         if np.issubdtype(values.dtype, np.floating) and np.isfinite(values).all()
     }
+
+
+def _to_physical_units(
+    controller: Controller, before: dict[str, float], after: dict[str, float]
+) -> dict[str, str]:
+    """Convert means to physical units where the configuration determines them; return all units."""
+    asked = {"outputs.loads": True, "outputs.contact": controller.system.equations.clearance}
+    run = plan_run(controller.system.config.replace(asked))
+    described, units = {one.name: one for one in variables_of(run)}, dict[str, str]()
+    for name in dict.fromkeys([*before, *after]):
+        variable = described.get(name)
+        units[name] = "1" if variable is None else variable.units
+        for means in (before, after):
+            if variable is None or name not in means:
+                continue
+            one = np.full((1,) * len(variable.dims), means[name])
+            with suppress(ConfigurationError):
+                shown, value = in_physical_units(variable, one, run.lanes.parameters)
+                means[name], units[name] = float(np.ravel(value)[0]), shown.units
+    return units
 
 
 def facts_of(trial: ControlTrial) -> dict[str, Any]:
@@ -194,6 +217,7 @@ def facts_of(trial: ControlTrial) -> dict[str, Any]:
         **_in_unit(efforts, controller),
         "before": trial.before,
         "after": trial.after,
+        "units": trial.units,
     }
 
 

@@ -260,10 +260,19 @@ def test_measures_after_a_trial_are_those_of_the_orbit_at_any_phase_of_the_excit
     assert trial.motion.captured.all()
     plan = system.plan._replace(transient_periods=0, recorded_periods=7, section_points=0)
     alone = integrate(system.equations, orbit.point[np.newaxis], plan._replace(loads=True))
-    assert trial.after["mesh_force_largest_tangential"] == pytest.approx(
-        alone.loads[0, 0, 0], rel=1e-5
-    )
-    assert trial.before["mesh_force_largest_tangential"] < 0.97 * alone.loads[0, 0, 0]
+    wanted = alone.loads[0, 0, 0] / system.equations.static_force()[0]
+    assert trial.after["load_factor_largest"] == pytest.approx(wanted, rel=1e-5)
+    assert trial.before["load_factor_largest"] < 0.97 * wanted
+    assert trial.units["load_factor_largest"] == "1"
+    assert trial.units["transmission_error_peak_to_peak"] == "um"
+    # The static force is that of the torque on the base radius of the driving gear.
+    helix, pressure = np.radians(15.0), np.radians(20.0)
+    transverse = np.arctan(np.tan(pressure) / np.cos(helix))
+    radius_m = 1e-3 * 7 * 2.0 / np.cos(helix) / 2.0 * np.cos(transverse)
+    along = np.cos(np.arcsin(np.sin(helix) * np.cos(pressure)))
+    assert trial.units["mesh_force_largest_tangential"] == "N"
+    static = trial.after["mesh_force_largest_tangential"] / trial.after["load_factor_largest"]
+    assert static == pytest.approx(0.6 / radius_m / along, rel=1e-6)
 
 
 def test_noise_spreads_the_state_as_the_lyapunov_equation_says():
