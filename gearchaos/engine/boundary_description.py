@@ -9,10 +9,9 @@ from gearchaos.dynamics.boundary_equations import Equations
 from gearchaos.engine.branching import flank_name
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.map_lines import Ranges
-from gearchaos.engine.provenance import provenance
+from gearchaos.engine.orbit_metadata import metadata_of, states_of
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.outputs import names as known
-from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.records.boundary import BOUNDARY_KINDS, Boundary, BoundaryPoint
 from gearchaos.results.files.boundary_file import BoundarySet
 from gearchaos.results.reading.result import Result
@@ -34,23 +33,10 @@ def described(
     if config.integration.method != run.config.integration.method:
         config = config.integrated_by(run.config.integration.method)
     order = sorted(boundaries, key=lambda one: (_rank(one.equations), one.ends[0]))
-    sections = run.lanes.model.catalogue.variables((), {SECTION_PART: run.lanes.states})
-    states = tuple(one for one in sections if one.name.startswith(known.SECTION))
     named = {one.name: one for one in variables_of(run)} | dict(result.variables)
     parameters = tuple(named[known.axis_name(one)] for one in over.parameters)
-    facts = {
-        "title": run.config.title,
-        "model": run.config.kind,
-        "effects": " ".join(run.config.scene.effects),
-        "method": run.config.integration.method,
-        "steps_per_period": run.plan.steps_per_period,
-        "excitation_period": run.lanes.repeats_after,
-        "longest_period": longest,
-        **provenance(0.0),
-        "configuration_resolved": config.resolved_toml(),
-    }
-    del facts["wall_time_seconds"]
-    return BoundarySet(parameters, states, tuple(_arrays(one, over, run) for one in order), facts)
+    arrays = tuple(_arrays(one, over, run) for one in order)
+    return BoundarySet(parameters, states_of(run), arrays, metadata_of(run, config, longest))
 
 
 def _arrays(boundary: TracedBoundary, over: Ranges, run: RunPlan) -> Boundary:

@@ -23,7 +23,7 @@ from gearchaos.dynamics.orbits import exponents_of
 from gearchaos.dynamics.side_by_side import counting, run, together
 from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.method_choice import for_continuation
-from gearchaos.engine.provenance import provenance
+from gearchaos.engine.orbit_metadata import metadata_of, states_of
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import one_thread
@@ -32,7 +32,6 @@ from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
-from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.outputs.variable import Variable
 from gearchaos.progress import progress, say
 from gearchaos.records.branch import HALVING, PERIOD_DOUBLING, PeriodicBranch, SpecialPoint
@@ -321,28 +320,14 @@ def _motion_at(curve: Curve, point: CurvePoint) -> _Motion:
 def _described(search: BranchSearch, parameter: Variable) -> BranchSet:
     """Return the branches of a search as arrays with their descriptions."""
     run = search.run
-    catalogue = run.lanes.model.catalogue
-    sections = catalogue.variables((), {SECTION_PART: run.lanes.states})
-    states = [one for one in sections if one.name.startswith(known.SECTION)]
     branches = sorted(
         (arrays_of_branch(search.over, one, run) for one in search.found),
         key=lambda one: (one.period, float(one.value.min())),
     )
     of_orbits = {name for one in branches for name in one.quantities}
     quantities = tuple(one for one in variables_of(run) if one.name in of_orbits)
-    facts = {
-        "title": run.config.title,
-        "model": run.config.kind,
-        "effects": " ".join(run.config.scene.effects),
-        "method": run.config.integration.method,
-        "steps_per_period": run.plan.steps_per_period,
-        "excitation_period": run.lanes.repeats_after,
-        "longest_period": search.longest,
-        **provenance(0.0),
-        "configuration_resolved": run.config.resolved_toml(),
-    }
-    del facts["wall_time_seconds"]
-    return BranchSet(parameter, tuple(states), tuple(branches), facts, quantities)
+    facts = metadata_of(run, run.config, search.longest)
+    return BranchSet(parameter, states_of(run), tuple(branches), facts, quantities)
 
 
 def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> PeriodicBranch:
