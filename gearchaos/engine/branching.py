@@ -127,9 +127,11 @@ def find_branches(
     with one_thread(), progress(None, unit="orbits") as bar:
         try:
             search.follow(search.motions(result, swept[0]), bar.update)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             if keep is not None and search.found:
                 keep(_described(search, result.variables[swept[0]]))
+            elif not search.found:
+                interrupt.add_note("no branch was complete, and nothing is kept")
             raise
         return _described(search, result.variables[swept[0]])
 

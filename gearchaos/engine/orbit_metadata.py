@@ -31,6 +31,6 @@ def metadata_of(run: RunPlan, config: Configuration, longest: int) -> dict[str, 
         **provenance(0.0),
         "configuration_resolved": config.resolved_toml(),
     }
-    # Nobody measured it.
+    # The time was not measured.
     del facts["wall_time_seconds"]
     return facts

@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import gearchaos
 from gearchaos.engine.branching import find_branches
 from gearchaos.figures import branches_page
+from gearchaos.interrupts import heeded
 from gearchaos.records.branch import (
     CLOSED_CURVE,
     EDGE,
@@ -325,6 +327,16 @@ def test_an_interrupt_keeps_the_branches_that_were_found(files, tmp_path):
     kept = tmp_path / "earlier_interrupted.h5"
     (count,) = re.findall(rf"{kept}: (\d+) branch(?:es)?, found before the interrupt", err)
     assert len(read_branches(kept).branches) == int(count) > 0
+
+
+def test_an_interrupt_before_the_first_branch_says_that_nothing_is_kept(files):
+    result, kept = gearchaos.open_result(files[0] / "sweep.h5"), []
+    with heeded(at_once=False):
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt) as interrupted:
+            find_branches(result, keep=kept.append)
+    assert kept == []
+    assert interrupted.value.__notes__ == ["no branch was complete, and nothing is kept"]
 
 
 def test_branches_meet_where_a_period_doubles(files):
