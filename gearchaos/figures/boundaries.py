@@ -94,8 +94,8 @@ def draw_boundaries(
     limits = axes.get_xlim(), axes.get_ylim()
     for one in over.lines:
         # A boundary of one point could not be followed; a dot shows where it is.
-        dot: dict[str, Any] = {"marker": ".", "ms": 3.0} if one.x.size == 1 else {}
-        (line,) = axes.plot(one.x, one.y[:, 0], zorder=3.0, **one.look, **dot)
+        dot = {"marker": ".", "ms": 3.0, "linestyle": "none"} if one.x.size == 1 else {}
+        (line,) = axes.plot(one.x, one.y[:, 0], zorder=3.0, **{**one.look, **dot})
         line.set_path_effects([withStroke(**_HALO)])
         names.setdefault(one.kind, line).set_label(one.kind)
     for point in over.points:
@@ -114,6 +114,7 @@ def boundary_overlay(found: BoundarySet, parameters: Sequence[str] | None = None
     lines, points = list[OverlaidLine](), list[OverlaidPoint]()
     for one in found.boundaries:
         kind = f"{one.kind}, period {one.period}" if several else one.kind
+        kind += ", one point" if one.arclength.size == 1 else ""
         look = {"linewidth": WIDTHS.get(one.period, 0.4), **LINES[one.kind]}
         x, y = one.values[:, order].T
         lines.append(OverlaidLine(kind, x, y[:, np.newaxis], look))

@@ -124,9 +124,10 @@ def select_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
     least, most = -np.inf if low is None else low, np.inf if high is None else high
     chosen = (parameter >= least) & (parameter <= most)
     if not chosen.any():
-        wanted = " to ".join("..." if end is None else f"{end}" for end in between)
+        ends = zip(("from", "to"), between, strict=True)
+        wanted = " ".join(f"{word} {end:g}" for word, end in ends if end is not None)
         there = f"{parameter.min():g} to {parameter.max():g}"
-        raise FigureError(f"no lane with {result.axis} from {wanted}; the result has {there}")
+        raise FigureError(f"no lane with {result.axis} {wanted}; the result has {there}")
     numbers = np.flatnonzero(chosen)
     numbers = numbers[np.argsort(parameter[numbers], kind="stable")]
     parameter = parameter[numbers]

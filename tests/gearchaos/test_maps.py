@@ -236,7 +236,7 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
         (["--mark", "torque=3"], "--mark torque: is no swept parameter of the figure"),
         (["--mark", "3"], "--mark 3: must be NAME=VALUE, each of the axes pitch_error, operation"),
         (["--mark", "pitch_error=99"], "--mark 99: pitch_error runs from "),
-        (["--from", "5000"], "no lane with operation_speed_rpm from 5000.0"),
+        (["--from", "5000"], "no lane with operation_speed_rpm from 5000; the result has"),
         (["--shares"], "fix others with --at NAME=VALUE"),
     ],
 )
