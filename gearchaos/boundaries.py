@@ -2,9 +2,9 @@
 
 Curves are started where the motion of the map changes between neighbouring lanes, and from special
 points of branches of periodic orbits along some lines across the map. They are folds, period
-doublings, Neimark-Sacker points, and grazing of each flank. Points of codimension 2 are located on
-them: cusps, resonances 1:1 to 1:4, fold-flip points, and points where a grazing meets another
-boundary.
+doublings, Neimark-Sacker points, and grazing of each flank by orbits of up to 100 mesh periods.
+Points of codimension 2 are located on them: cusps, resonances 1:1 to 1:4, fold-flip points, and
+points where a grazing meets another boundary.
 
 INPUT is the result of a sweep of two parameters with labels, or a configuration. For a
 configuration a coarse map is computed first. The curves are written to an HDF5 file; gearchaos plot

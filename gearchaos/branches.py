@@ -3,7 +3,7 @@
 Every periodic motion that the sweep found is continued in both directions over the swept range,
 around folds and through losses of stability. At period doublings the branch of twice the period is
 followed as well. Special points are located: folds, branch points, period doublings, Neimark-Sacker
-points, and grazing of each flank.
+points, and grazing of each flank by orbits of up to 100 mesh periods.
 
 INPUT is the result of a sweep of one parameter with labels, or a configuration, which is computed
 first. The branches are written to an HDF5 file; gearchaos plot draws it, alone or into the diagram

@@ -245,10 +245,11 @@ def _measure(name: str) -> str:
 
 def _number(value: complex) -> str:
     """Return a multiplier as text."""
+    # Adding zero removes the sign of what is rounded to zero.
+    real = f"{round(value.real, 4) + 0.0:.4f}"
     if abs(value.imag) < 1e-12:
-        # Without the sign of what is rounded to zero.
-        return f"{round(value.real, 4) + 0.0:.4f}"
-    return f"{value.real:.4f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.4f}i"
+        return real
+    return f"{real} {'+' if value.imag > 0 else '-'} {abs(value.imag):.4f}i"
 
 
 def _percent(share: float) -> str:

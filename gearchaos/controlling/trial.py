@@ -77,6 +77,7 @@ class ControlTrial(NamedTuple):
             scale=scale,
             words=words,
             target=target,
+            repeats=controller.system.repeats_after,
             free=self.free,
             held=self.held,
             states=(first, rate),

@@ -134,9 +134,13 @@ class TracedBoundary(NamedTuple):
         return False
 
     def is_at(self, place: Floats) -> bool:
-        """Whether the boundary has no other point than one at a place (states + 2,)."""
-        alone = len(self.points) == 1
-        return bool(alone and np.linalg.norm(self.places[0] - place) < SAME_POINT)
+        """Whether the boundary has one point only, an orbit through a place (states + 2,)."""
+        if len(self.points) > 1:
+            return False
+        states, (one,) = self.equations.scale.size, self.points
+        away = one.section / self.equations.scale - place[:states]
+        beside = np.linalg.norm(one.shares - place[states:])
+        return bool(np.hypot(np.linalg.norm(away, axis=1), beside).min() < SAME_POINT)
 
     def passes(self, place: Floats) -> bool:
         """Whether the boundary comes closer to a place (states + 2,) than `NEAR`."""

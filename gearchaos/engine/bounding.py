@@ -128,7 +128,7 @@ def find_boundaries(
                 say(f"{count_of(len(some), 'line')}: {traced}; {found}")
             search.from_changes()
             found = count_of(len(search.boundaries.found), "boundary", "boundaries")
-            say(f"with the changes that were left: {found}")
+            say(f"{found} in all")
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{searched} of {len(places)} lines were searched")
             if keep is not None and search.boundaries.found:
@@ -271,10 +271,11 @@ class _BoundarySearch:
         axes = [known.axis_name(one) for one in self.over.parameters]
         ends = np.array([self.over.low, self.over.high])
         impacts = [f"impacts_{side}_{element}" for element in self.run.elements for side in SIDES]
-        long = self.run.lanes.repeats_after > LONGEST_GRAZING
-        if long or any(name not in result.variables for name in impacts):
+        if any(name not in result.variables for name in impacts):
             impacts = []
-        self.left = changes_of(result, axes, ends, self.longest, impacts)
+        found = changes_of(result, axes, ends, self.longest, impacts)
+        long = found.period * self.run.lanes.repeats_after > LONGEST_GRAZING
+        self.left = found.of((found.flank < 0) | ~long)
         say(f"{len(self.left.flank)} changes of the map")
 
     def from_changes(self) -> None:

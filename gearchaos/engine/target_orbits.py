@@ -20,8 +20,11 @@ from gearchaos.models.registry import system_of
 from gearchaos.progress import count_of
 from gearchaos.records.period import coordinate_scale
 
-LEAST_TRANSIENT = 300
-"""Smallest number of mesh periods before the motion is searched for the orbit."""
+LEAST_TRANSIENT, MOST_MESH_PERIODS = 300, 30_000
+"""Fewest excitation periods before the motion is searched for the orbit.
+
+Fewer have to do where they would have more mesh periods than the second number.
+"""
 
 ROUGH = 1e-3
 """Length of the stretch in which special points of the branch are located; none is used."""
@@ -94,7 +97,8 @@ def _found(run: RunPlan, wanted: TargetOrbits) -> Floats:
     assert control is not None
     system = machine_at(run, wanted.parameter, np.array([wanted.found_at]))
     repeats = system.repeats_after
-    transient = -(-max(plan.transient_periods, LEAST_TRANSIENT) // repeats) * repeats
+    least = min(LEAST_TRANSIENT, -(-MOST_MESH_PERIODS // repeats))
+    transient = max(-(-plan.transient_periods // repeats), least) * repeats
     record = plan.over(record_length(repeats) * repeats, transient)
     start = start_states(run.config, system, np.zeros(1, dtype=np.intp))
     outcome = kernels.integrate(system, start, record)

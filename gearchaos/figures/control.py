@@ -1,6 +1,6 @@
 """A page about a controller: section and input over time, capture times, and phase portraits."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,6 +34,8 @@ class ControlDrawing(NamedTuple):
         Label of the axis of the inputs.
     target : array, shape (mesh periods, states)
         The section points of the target orbit.
+    repeats : int
+        Mesh periods after which the excitation repeats; the orbit may be followed from any of them.
     free, held : array, shape (samples, states)
         A motion without control, and one that the controller has captured.
     states : (Variable, Variable)
@@ -46,6 +48,7 @@ class ControlDrawing(NamedTuple):
     scale: float
     words: str
     target: Floats
+    repeats: int
     free: Floats
     held: Floats
     states: tuple[Variable, Variable]
@@ -93,11 +96,17 @@ def draw_section(axes: Axes, shown: ControlDrawing) -> None:
     time = np.arange(1, section.shape[1] + 1)
     for values, colour in zip(section, COLOURS, strict=False):
         axes.plot(time, values, ".", color=colour, markersize=1.5, markeredgewidth=0.0)
-    target, look = shown.target[:, 0], dict[str, Any](color=GREY, label="target orbit")
-    if target.size <= MOST_LINES:
-        axes.hlines(target, 0, time[-1], linewidth=0.6, linestyle=(0, (4, 2)), **look)
+    target = shown.target[:, 0]
+    if shown.repeats == 1 or target.size <= MOST_LINES:
+        lines = [axes.axhline(point, linewidth=0.6, linestyle=(0, (4, 2))) for point in target]
     else:
-        axes.plot(time, target[time % target.size], linewidth=0.4, zorder=0.5, **look)
+        # The motion may follow the orbit from the beginning of any of its excitation periods.
+        begins = np.arange(0, target.size, shown.repeats)
+        places = target[(time[:, np.newaxis] + begins) % target.size]
+        lines = axes.plot(time, places, linewidth=0.4, zorder=0.5)
+    for line in lines:
+        line.set_color(GREY)
+    lines[0].set_label("target orbit")
     axes.set_xlim(0, shown_periods(shown.motion))
     axes.set_xlabel(shown.time_label)
     axes.set_ylabel(f"Section {symbol_of(shown.states[0])}")

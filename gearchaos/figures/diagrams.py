@@ -31,7 +31,9 @@ from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, DASHES, GREY, VERMILION
 from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 from gearchaos.outputs.names import (
+    CONTACT_STATE,
     EXPONENT_NUMBER,
+    LABELS,
     LARGEST_EXPONENT,
     ORDER,
     RECORD,
@@ -179,9 +181,10 @@ def _diagram_variable(result: Result, variable: str | None) -> str:
     variable = variable or next(iter(section_variables(result)), DEFAULT_VARIABLE)
     kinds = result.variables[variable].flags if variable in result.variables else ()
     if kinds:
+        listed = variable == LABELS[0] or variable.startswith(CONTACT_STATE)
+        remedy = "gearchaos stages lists the values of each kind" if listed else "choose another"
         raise FigureError(
-            f"{variable}: has kinds ({', '.join(kinds)}), and a diagram draws numbers; "
-            "gearchaos stages lists the values of each kind, and a map of two parameters draws them"
+            f"{variable}: has kinds ({', '.join(kinds)}), and a diagram draws numbers; {remedy}"
         )
     check_variable(variable, diagram_variables(result), "of the diagram")
     return variable

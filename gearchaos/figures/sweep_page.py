@@ -16,7 +16,7 @@ from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import legend_above, legend_entries, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
-from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, ORDER, WAYS
+from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, ORDER, SECTION_POINT, WAYS
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.jumps import apart, directions_of
 from gearchaos.results.reading.result import Result, section_variables
@@ -179,12 +179,18 @@ def _draw(
     else:
         words = [max(map(form_in_words, results))]
         if overlay.of_section:
-            words.append(max(excitation_of(one.metadata).points_in_words for one in results))
+            words.append(max(map(_points_in_words, results)))
         footnote(figure, "\n".join(filter(None, words)))
     places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
     if places:
         figure.suptitle("; ".join(places))
     figure.align_ylabels(stack)
+
+
+def _points_in_words(result: Result) -> str:
+    """Return how many section points a motion of period 1 has, if it has several."""
+    shown = result[SECTION_POINT].size if SECTION_POINT in result else 1
+    return excitation_of(result.metadata).points_in_words(shown)
 
 
 def _draw_panels(figure: Page, overlay: _Overlay) -> list[Axes]:

@@ -1,6 +1,7 @@
 """Branches of periodic orbits over a parameter, as they are computed, stored and drawn."""
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any, NamedTuple
 
 from gearchaos.arrays import Complex, Floats, Mask
@@ -44,14 +45,15 @@ Longer ones, as of teeth with errors of their own, graze a flank at nearly every
 def notes_of(metadata: Mapping[str, Any]) -> list[str]:
     """Return the notes below a table of special points.
 
-    ``metadata``: that of the branches or boundaries, with ``method``, ``steps_per_period`` and
-    ``excitation_period``.
+    ``metadata``: that of the branches or boundaries, with ``method``, ``steps_per_period``,
+    ``excitation_period`` and ``longest_period``.
     """
-    notes, repeats = [], int(metadata.get("excitation_period", 1))
-    if repeats > LONGEST_GRAZING:
+    notes = []
+    longest = (int(metadata.get(name, 1)) for name in ("excitation_period", "longest_period"))
+    if prod(longest) > LONGEST_GRAZING:
         notes.append(
-            f"an orbit has {repeats} mesh periods or more: its grazings are not looked for, since "
-            "it grazes a flank at nearly every value"
+            f"grazings of orbits of more than {LONGEST_GRAZING} mesh periods are not looked for: "
+            "such orbits graze a flank at nearly every value"
         )
     if metadata.get("method") == STEPPED:
         steps = int(metadata["steps_per_period"])

@@ -52,14 +52,12 @@ MOST_SLICES = 6
 
 MAP = "Map: kind of motion, largest Lyapunov exponent and contact at each pair of values"
 DIAGRAM = (
-    "Bifurcation diagram: the section of the motion at each value. {points}, a cloud is a chaotic "
+    "Bifurcation diagram: the section of the motion at each value. {points}. A cloud is a chaotic "
     "or quasi-periodic motion. Below it, where it was computed, the largest Lyapunov exponent, "
     "which is positive where the motion is chaotic"
 )
 ONE_POINT = "One point means period 1, n points period n"
-POINTS_OF_EXCITATION = (
-    "Pitch errors repeat after {n} mesh periods, and the figure shows one point for each of {shown}"
-)
+MORE_POINTS = "Period n has n times as many"
 SHARES = "Shares of motions among all gear pairs and starts at each value, and of contact loss"
 BASINS = "Basins of attraction: the attractor that each start leads to"
 BASIN_SHARES = "Share of the starts that leads to each attractor"
@@ -177,10 +175,10 @@ def _pages(one: Result, found: Basins | None) -> Pages:
 
 def _diagram_caption(one: Result) -> str:
     """Return the caption of a bifurcation diagram."""
-    n = excitation_of(one.metadata).excitation_period
-    shown = min(n, one[SECTION_POINT].size if SECTION_POINT in one else n)
-    points = POINTS_OF_EXCITATION.format(n=n, shown="them" if shown == n else f"the last {shown}")
-    return DIAGRAM.format(points=points if n > 1 else ONE_POINT)
+    shown = one[SECTION_POINT].size if SECTION_POINT in one else 1
+    words = excitation_of(one.metadata).points_in_words(shown).replace("\n", " ")
+    points = f"{words[:1].upper()}{words[1:]}. {MORE_POINTS}" if words else ONE_POINT
+    return DIAGRAM.format(points=points)
 
 
 def _largest_loads(one: Result) -> list[str]:

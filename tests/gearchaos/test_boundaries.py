@@ -10,6 +10,8 @@ import pytest
 from gearchaos_kernels import Plan
 
 import gearchaos
+from gearchaos.dynamics.arclength import CurvePoint
+from gearchaos.dynamics.boundaries import unstarted
 from gearchaos.dynamics.boundary_equations import Equations
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
@@ -468,3 +470,15 @@ def test_a_curve_at_one_value_is_drawn_as_a_straight_line(found):
     page = boundaries_page(found._replace(boundaries=(straight,)))
     low, high = page.axes[0].get_xlim()
     assert high - low > 0.01 and low < values[:, 0].min() and values[:, 0].max() < high
+
+
+def test_a_boundary_of_one_point_is_known_by_each_section_point_of_its_orbit():
+    equations = Equations(None, None, 2, np.array([1.0, 2.0]), PERIOD_DOUBLING)
+    section, nothing = np.array([[0.5, 0.1], [0.2, 0.4]]), np.zeros(2)
+    place = np.array([0.2, 0.2, 0.3, 0.6])
+    special = CurvePoint(place[:3], place[:3], nothing, 0.0, nothing, (), section, nothing)
+    one = unstarted(equations, place, special)
+    other = np.array([0.5, 0.05, 0.3, 0.6])
+    assert one.is_at(place) and one.is_at(other)
+    for component in range(4):
+        assert not one.is_at(other + 1e-4 * np.eye(4)[component])

@@ -23,6 +23,8 @@ from gearchaos.dynamics.control import (
 from gearchaos.dynamics.controllers import ControlSettings
 from gearchaos.dynamics.riccati import riccati
 from gearchaos.errors import ConfigurationError
+from gearchaos.figures import control_page
+from gearchaos.figures.style import GREY
 from gearchaos.models import Configuration
 
 from .commands import SMALL, run_module
@@ -352,6 +354,20 @@ def test_the_command_prints_a_table_and_json_and_draws(tmp_path):
     heading = "means over the starts, lengths and forces in the units of the equations:"
     assert {line, heading} <= {*printed.splitlines()}
     assert "  share of the time apart, tangential " in printed
+
+
+def test_a_long_target_is_drawn_from_each_of_its_excitation_periods():
+    drawing = try_controller(controller(), 2, 40).drawing()
+    target = np.random.default_rng(0).normal(size=(21, 6))
+    page = control_page(drawing._replace(target=target, repeats=7))
+    lines = [one for one in page.axes[0].lines if one.get_color() == GREY]
+    assert [one.get_label() for one in lines].count("target orbit") == 1
+    for begin, line in zip((0, 7, 14), lines, strict=True):
+        time, places = line.get_data()
+        assert np.array_equal(places, target[(time + begin) % 21, 0])
+    page = control_page(drawing._replace(target=target, repeats=1))
+    lines = [one for one in page.axes[0].lines if one.get_color() == GREY]
+    assert [one.get_ydata()[0] for one in lines] == target[:, 0].tolist()
 
 
 def test_the_command_names_an_orbit_that_is_not_there(tmp_path):

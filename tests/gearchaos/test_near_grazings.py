@@ -8,7 +8,9 @@ from gearchaos_kernels.models.linear.system import LinearSystems
 from gearchaos.dynamics.arclength import along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
+from gearchaos.dynamics.embedded import record_length
 from gearchaos.dynamics.near_grazings import near_grazings
+from gearchaos.records.branch import notes_of
 
 DAMPING, LOAD = 0.4, 0.2
 PEAK = 1.0 / np.sqrt(1.0 - DAMPING**2 / 2.0)
@@ -34,6 +36,23 @@ def spur_pairs(frequency):
         half_clearance=np.ones((lanes, 1)),
         orders=(1,),
     )
+
+
+def test_orbits_of_more_than_100_mesh_periods_have_no_grazings_and_a_note_says_so():
+    over = BranchRange(spur_pairs, PEAK - 0.3, PEAK + 0.5)
+    plans = [over.curve(Plan(16, 0, 1, 1), period, np.ones(2)).plan for period in (100, 101)]
+    assert [plan.contact for plan in plans] == [True, False]
+    facts = {"method": "flow_map", "excitation_period": 25}
+    assert notes_of({**facts, "longest_period": 4}) == []
+    (note,) = notes_of({**facts, "longest_period": 5})
+    assert note.startswith("grazings of orbits of more than 100 mesh periods are not looked for")
+
+
+@pytest.mark.parametrize(
+    ("repeats", "periods"), [(1, 20_000), (10, 20_000), (1081, 185), (10**6, 100)]
+)
+def test_a_record_has_fewer_excitation_periods_where_they_are_long(repeats, periods):
+    assert record_length(repeats) == periods
 
 
 @pytest.fixture(scope="module")

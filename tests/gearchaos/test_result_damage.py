@@ -70,6 +70,8 @@ def test_every_truncation_is_refused(good: Path, tmp_path: Path) -> None:
     for end in sorted(ends | {len(content) - 50, len(content) - 1}):
         cut.write_bytes(content[:end])
         assert refusal(cut)
+    cut.write_bytes(content[: whole // 2])
+    assert f"is cut off after {whole // 2:,} of {whole:,} bytes" in refusal(cut)
 
 
 def test_any_changed_byte_is_noticed(good: Path, tmp_path: Path) -> None:

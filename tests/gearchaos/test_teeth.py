@@ -175,7 +175,7 @@ def test_pairs_that_share_the_load_part_where_they_differ_by_more_than_it_bends_
         # The length scale is 50 um; 20 um between the first and third tooth are 18.6 um along the
         # line of action.
         assert ("by up to 18.6 um, and the static deflection there is 18.6 um" in said) == parts
-        assert ("at a higher operation.torque_Nm or groups.load" in said) == parts
+        assert ("a high enough operation.torque_Nm or groups.load" in said) == parts
 
 
 def test_the_printed_form_says_what_it_makes_of_errors_of_teeth():

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 import gearchaos
-from gearchaos.figures import response_page, shares_page
+from gearchaos.figures import bifurcation_page, response_page, shares_page
 from gearchaos.figures.page import Page
 from gearchaos.figures.response import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
@@ -296,6 +296,20 @@ def test_a_sine_says_nothing_of_teeth(tmp_path):
     assert excitation_of(result.metadata) == Excitation()
     assert not {*Excitation._fields[1:]} & result.metadata.keys()
     assert excitation_of(result.metadata).in_words == ""
+
+
+@pytest.mark.parametrize(("shown", "last"), [(12, ""), (48, ""), (5, ", and the last 5 are drawn")])
+def test_the_points_of_a_period_are_counted_as_they_are_drawn(shown, last):
+    excitation = Excitation(excitation_period=12)
+    words = f"the excitation repeats after 12 mesh periods:\nperiod 1 has 12 points{last}"
+    assert excitation.points_in_words(shown) == words
+    assert Excitation().points_in_words(shown) == ""
+
+
+def test_a_diagram_says_how_many_points_a_period_has():
+    section = bifurcation_page(known_teeth())
+    assert "period 1 has 12 points" in section.get_supxlabel()
+    assert "points" not in bifurcation_page(known_teeth(), "return_distance").get_supxlabel()
 
 
 def test_the_commands_say_what_a_period_is(path, capsys):

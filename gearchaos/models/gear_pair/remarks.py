@@ -121,8 +121,8 @@ def _parting_pairs(system: GearPairs, length_um: Floats | None) -> str:
         f"in {parting.mean():.0%} of the lanes tooth pairs that share the load differ by up to "
         f"{worst:.3g} {unit}, and the static deflection there is {below:.3g} {unit} at the least; "
         "a pair may then part while others carry, which the model leaves out: do not rely on the "
-        "loads of these lanes; at a higher operation.torque_Nm or groups.load, or with gears of a "
-        "finer grade, all pairs stay together"
+        "loads of these lanes; a high enough operation.torque_Nm or groups.load, or gears of a "
+        "finer grade, would keep all pairs together"
     )
 
 

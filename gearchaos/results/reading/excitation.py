@@ -30,11 +30,15 @@ class Excitation(NamedTuple):
         n = self.excitation_period
         return f"periods are those of the excitation, {n} mesh periods each" if n > 1 else ""
 
-    @property
-    def points_in_words(self) -> str:
-        """A sentence on the points of a section; empty where each period has one."""
+    def points_in_words(self, shown: int) -> str:
+        """Return a sentence on the points of a section; empty where each period has one.
+
+        ``shown``: number of section points of each lane.
+        """
         n = self.excitation_period
-        return f"the excitation repeats after {n} mesh periods: period 1 has {n} points" * (n > 1)
+        last = f", and the last {shown} are drawn" if shown < n else ""
+        points = f"period 1 has {n} points{last}"
+        return f"the excitation repeats after {n} mesh periods:\n{points}" if n > 1 else ""
 
 
 def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
