@@ -1,5 +1,9 @@
 """Flow maps that are interpolated between values of one parameter."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan, integrate
@@ -96,3 +100,30 @@ def test_values_that_are_not_positive_have_computed_maps(made):
     backwards = system.with_map_parameter(along, np.array([-1.0]))
     assert interpolated(backwards, 12, scene_of(backwards, PLAN), along, "name") == [None]
     assert not made
+
+
+INTERPOLATED = """
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+from gearchaos_kernels.methods.flow_map.interpolation import NODES, Piece
+random = np.random.default_rng(0)
+nodes, tables = 1.0 + np.arange(NODES) / NODES, random.normal(size=(NODES, 58_997))
+found = [Piece(nodes, tables, (1, 58_997)).at(1.0 + share).tobytes() for share in random.random(9)]
+print(hashlib.sha256(b"".join(found)).hexdigest())
+"""
+"""Interpolate maps that are so large that a product of matrices would have several threads."""
+
+
+def test_interpolated_maps_have_the_same_bits_for_any_number_of_threads_of_linear_algebra():
+    found = set()
+    for threads in ("1", "2", "4"):
+        names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+        environment = os.environ | dict.fromkeys(names, threads)
+        command = [sys.executable, "-c", INTERPOLATED]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        found.add(done.stdout)
+    assert len(found) == 1

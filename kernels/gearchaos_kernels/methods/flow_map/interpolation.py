@@ -28,6 +28,13 @@ ACCURACY = 1e-14
 MARGIN = 1.01
 """Factor of the bounds of the gaps: they have corners, so the largest one of a piece is taken."""
 
+BLOCK = 8192
+"""Numbers of maps that are interpolated in one call of a matrix product.
+
+Libraries of linear algebra share longer products among threads. These then round differently for
+every number of threads, and take ten times as long next to other busy processes.
+"""
+
 _ANGLES = (2 * np.arange(NODES) + 1) * np.pi / (2 * NODES)
 _CHECKED = np.array([-1.0, 0.05, 1.0])
 """Where the maps of a piece are checked, from -1 to 1; no node lies there."""
@@ -61,8 +68,13 @@ class Piece(NamedTuple):
         (same,) = np.nonzero(np.isinf(weights))
         if same.size:
             weights = np.isinf(weights).astype(np.float64)
-        # The sum over nodes has the same order for any number of lanes.
-        found: Floats = np.matmul(weights / weights.sum(), self.tables, out=target)
+        weights /= weights.sum()
+        size = self.tables.shape[1]
+        found = np.empty(size) if target is None else target
+        # The sum over nodes has the same order for any number of lanes and of threads.
+        for begin in range(0, size, BLOCK):
+            some = slice(begin, begin + BLOCK)
+            np.matmul(weights, self.tables[:, some], out=found[some])
         return found.reshape(self.shape)
 
 
