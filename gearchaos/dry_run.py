@@ -172,9 +172,8 @@ def _seconds_per_lane(run: RunPlan) -> float:
             )
             sample = replace(run, plan=shorter)
             began = time.perf_counter()
-            integrate_places(
-                sample, places, shorter._replace(transient_periods=0, recorded_periods=0)
-            )
+            nothing = shorter._replace(transient_periods=0, recorded_periods=0, section_points=0)
+            integrate_places(sample, places, nothing)
             made = time.perf_counter()
             found = integrate_places(sample, places, sample.recording)
             arrays_of(sample, sample.lanes.computed_at(places), *found)

@@ -247,4 +247,7 @@ def _strategy(begin: Floats, population: int, random: np.random.Generator) -> An
             "seed": np.nan,
             "verbose": -9,
         }
+        if begin.size == 1:
+            # With one parameter, the package fails where it limits the spread.
+            options["maxstd"] = np.inf
         return cma.CMAEvolutionStrategy(begin, FIRST_SPREAD, options)

@@ -19,6 +19,7 @@ from gearchaos_kernels.plan import Floats, Outcome, Plan, Schedule, Status
 from gearchaos_kernels.recorders.contact import ROWS as CONTACT_ROWS
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, signals_of
 from gearchaos_kernels.recorders.registry import RECORDERS, Recorded
+from gearchaos_kernels.requests import require_fitting
 from gearchaos_kernels.scene import Scene, flag, provider_of
 
 LARGEST_GROWTH = 200.0
@@ -102,7 +103,8 @@ def integrate(
     Raises
     ------
     ValueError
-        If method, model or kernels do not support the request, see `LaneSystem.refuses_maps`.
+        If an array does not have its shape, if a number of the plan is out of its range, or if
+        method, model or kernels do not support the request, see `LaneSystem.refuses_maps`.
 
     Examples
     --------
@@ -110,7 +112,8 @@ def integrate(
 
         outcome = integrate(pairs, start, Plan(200, 300, 100, 100, tangent=True))
     """
-    (lanes, states), scene = start.shape, scene_of(system, plan)
+    require_fitting(system, plan, {"start": start, "tangent_start": tangent_start}, periods)
+    (lanes, states), scene = np.shape(start), scene_of(system, plan)
     outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
     recorded = _recorded_periods(plan, periods, outcome)
     for prepared in METHODS[plan.method].prepare(system, plan, scene, recorded):

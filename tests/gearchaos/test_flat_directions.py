@@ -1,6 +1,7 @@
 """A search finds the directions that observations leave open, within its candidates."""
 
 import re
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -49,6 +50,18 @@ def searched(residuals, **settings):
 def alike(residuals, **settings):
     _, points, misfits = searched(residuals, **settings)
     return points[misfits <= np.min(misfits) + ONE_UNIT]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_one_parameter_alone_is_found(seed):
+    asking = proposals(Search(candidates=200, drawn=20, runs=2, population=10, seed=seed), 1)
+    (_, points), best = next(asking), np.inf
+    with suppress(StopIteration):
+        while True:
+            residual = WIDTHS * (points - 0.4)
+            best = min(best, float(np.abs(points - 0.4).min()))
+            _, points = asking.send(np.column_stack([misfit(residual), residual]))
+    assert best < 1e-3
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -30,6 +30,7 @@ def read(text, folder=None):
     [
         ("mass = [1.0, 1.0]", "mass = [1.0, 0.0]", "model.mass = [1.0, 0.0]: is singular"),
         ("mass = [1.0, 1.0]", "mass = [1.0]", "must have 2 rows and columns"),
+        ("mass = [1.0, 1.0]", "mass = [[0.1, 1.0], [1.0, 0.1]]", "is not positive definite"),
         ("[-1.0, 2.0]]", "[-1.0]]", "model.stiffness = [[1.0, -1.0], [-1.0]]: must have 2 rows"),
         ("stiffness = 100.0\n", "", "clearance.stop.stiffness: is missing"),
         ("stiffness = 100.0", "stiffness = 0.0", "must be greater than 0, otherwise"),
@@ -41,6 +42,7 @@ def read(text, folder=None):
             "has no coordinate with a factor other than 0",
         ),
         ("stiffness = 100.0", "stiffness = { mean = -1.0 }", "must be at least 0"),
+        ("stiffness = 100.0", "stiffness = -1.0", "stiffness = -1.0: must be at least 0"),
         ("stiffness = 100.0", "stiffness = { mean = 1.0, sin = [1.0] }", "did you mean `sine`?"),
         ("stiffness = 100.0", "stiffness = true", "clearance.stop.stiffness = true: must be a num"),
         ("stiffness = 100.0", 'stiffness = { shape = "tabel" }', 'must be "fourier" or "table"'),
@@ -67,6 +69,12 @@ def test_a_machine_that_cannot_be_is_refused_in_a_sentence(tmp_path, old, new, m
         read(TEXT.replace(old, new, 1), str(tmp_path))
     assert message in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_sweep_over_negative_stiffnesses_is_refused():
+    text = TEXT.replace('parameter = "frequency"', 'parameter = "clearance.stop.stiffness"')
+    with pytest.raises(gearchaos.ConfigurationError, match=r"clearance\.stop\.stiffness must be"):
+        read(text.replace("from = 0.55", "from = -10.0"))
 
 
 def test_a_machine_that_is_unstable_is_computed_with_a_remark():

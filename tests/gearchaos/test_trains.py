@@ -173,6 +173,7 @@ def test_a_planetary_set_can_be_purely_torsional():
 
 
 LOOP = {"gears": ["pinion_1", "wheel_2"], "stiffness_N_per_um": 400.0, "contact_ratio": 1.7}
+TWICE = {**LOOP, "gears": ["wheel_1", "pinion_1"]}
 RADII = {"parameter": "gear.pinion_1.base_radius_mm", "values": [33.8, 40.0]}
 DRIVES = [
     ("sun", "ring", "carrier"),
@@ -297,6 +298,12 @@ def test_a_train_at_rest_carries_its_load():
         ("two_stage", "mesh.third", LOOP, "cannot turn with the other meshes"),
         ("two_stage", "sweep", RADII, "has its own tooth data; give normal_module_mm in place"),
         ("two_stage", "mesh.first.half_backlash_um", -1.0, "must be at least 0"),
+        ("two_stage", "mesh.first.gears", ["wheel_1", "wheel_1"], "names one gear twice"),
+        ("two_stage", "mesh.third", TWICE, "names the gears of mesh.first; remove one of the two"),
+        ("two_stage", "shaft.middle.uniform", True, "given for input, middle, and one shaft is"),
+        ("two_stage", "operation.speed_rpm", -1.0, "speed_rpm = -1.0: must be greater than 0"),
+        ("two_stage", "operation.speed", 1.0, "unknown key"),
+        ("two_stage", "operation", {}, "operation.speed_rpm: is missing"),
         ("two_stage", "shaft.input.uniform", False, "nothing holds input_angle"),
         ("two_stage", "shaft.middle.mass_kg", None, "is missing for a shaft with a bearing"),
         ("two_stage", "outputs.section", ["output"], "the machine has no state `output`"),

@@ -8,6 +8,7 @@ import numpy as np
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.rules import Rules
+from gearchaos.configuration.tables import swept_values
 from gearchaos.models.linear.machine import without_drift
 from gearchaos.models.linear.tables import MATRICES, Row, Shares
 
@@ -49,6 +50,16 @@ def _rows_name_coordinates(config: "LinearConfiguration") -> Iterator[Fault]:
             yield Fault(path, "has no coordinate with a factor other than 0", remedy, row)
 
 
+@RULES.reads("clearance")
+def _swept_stiffnesses_are_positive(config: "LinearConfiguration") -> Iterator[Fault]:
+    """A sweep over the stiffness of an element has no negative value."""
+    for table, sweep in config.sweeps.items():
+        path, least = sweep.parameter, float(swept_values(sweep).min())
+        if path.startswith("clearance.") and path.endswith(".stiffness") and least < 0.0:
+            rule = f"{path} must be at least 0, and the least value is {least:g}"
+            yield Fault(f"{table}.parameter", rule, "sweep inside that range", path)
+
+
 @RULES.reads("model", "clearance", "force")
 def _the_machine_can_move_and_is_held(config: "LinearConfiguration") -> Iterator[Fault]:
     """The mass matrix is not singular, and springs hold every coordinate."""
@@ -59,6 +70,10 @@ def _the_machine_can_move_and_is_held(config: "LinearConfiguration") -> Iterator
     if np.linalg.matrix_rank(machine.mass) < len(names):
         rule = "is singular, so that some acceleration is not determined"
         yield Fault("model.mass", rule, "give every coordinate a mass", config.model.mass)
+        return
+    if np.linalg.eigvals(machine.mass).real.min() < 0.0:
+        rule = "is not positive definite: some motion would have a negative mass"
+        yield Fault("model.mass", rule, "check its entries", config.model.mass)
         return
     for name, one in config.clearance.items():
         mean = one.waves.mean

@@ -53,7 +53,7 @@ def _form_of(given: Any) -> str:
 
 
 Stiffness: TypeAlias = Annotated[
-    Annotated[float, Tag("number")]
+    Annotated[float, Field(ge=0), Tag("number")]
     | Annotated[Fourier, Tag("fourier")]
     | Annotated[StiffnessTable, Tag("table")],
     Discriminator(
@@ -93,7 +93,10 @@ class Clearance(Table):
         if isinstance(given, StiffnessTable):
             series = given.series
             return Fourier.model_construct(mean=series.mean, cosine=series.cosine, sine=series.sine)
-        return given if isinstance(given, Fourier) else Fourier(mean=given)
+        if isinstance(given, Fourier):
+            return given
+        # A swept value is checked with its sweep.
+        return Fourier.model_construct(mean=given, cosine=(), sine=())
 
 
 class Force(Table):

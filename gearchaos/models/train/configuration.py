@@ -72,7 +72,11 @@ class TrainConfiguration(MachineConfiguration):
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
         """The numbers that a sweep can vary, by their dotted path."""
-        tables = {name: getattr(self, name) for name in PARTS}
+        # A table with a fault of its own is missing; its speed is a parameter nevertheless.
+        operation = Operation.model_construct(speed_rpm=1.0)
+        tables = {"operation": operation} | {
+            name: getattr(self, name) for name in PARTS if hasattr(self, name)
+        }
         return MappingProxyType(parameters_in(type(self), tables) | dict(OF_CONTROLLERS))
 
     @property
@@ -172,6 +176,25 @@ def _names_exist(config: TrainConfiguration) -> Iterator[Fault]:
                 yield Fault(f"mesh.{name}.gears", f"names {one}, which is no gear", remedy)
 
 
+@RULES.reads("shaft", "mesh")
+def _parts_are_there_once(config: TrainConfiguration) -> Iterator[Fault]:
+    """One shaft is the input, and a mesh has two gears that no other mesh has."""
+    inputs = [name for name, one in config.shaft.items() if one.uniform]
+    if len(inputs) > 1:
+        rule = f"uniform = true is given for {', '.join(inputs)}, and one shaft is the input"
+        yield Fault("shaft", rule, "keep it for one of them")
+    known: dict[frozenset[str], str] = {}
+    for name, mesh in config.mesh.items():
+        pair = frozenset(mesh.gears)
+        if len(pair) == 1:
+            rule = "names one gear twice"
+            yield Fault(f"mesh.{name}.gears", rule, "give two gears", list(mesh.gears))
+        elif pair in known:
+            rule = f"names the gears of mesh.{known[pair]}"
+            yield Fault(f"mesh.{name}.gears", rule, "remove one of the two", list(mesh.gears))
+        known.setdefault(pair, name)
+
+
 @RULES.reads("shaft", "gear", "mesh")
 def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
     """Meshes connect all shafts, let them turn, and repeat after a reasonable time."""
@@ -237,7 +260,7 @@ def _every_mesh_has_one_stiffness(config: TrainConfiguration) -> Iterator[Fault]
             yield Fault(f"{path}.stiffness.unit", rule, remedy, mesh.stiffness.unit or "missing")
 
 
-@RULES.reads("shaft", "gear", "mesh", "planetary", "scene")
+@RULES.reads("operation", "shaft", "gear", "mesh", "planetary", "scene")
 def _the_train_is_held(config: TrainConfiguration) -> Iterator[Fault]:
     """Something keeps every part of the train in place."""
     faults = (_planets_can_be_assembled, _every_mesh_has_one_stiffness, _gears_fit_each_other)
