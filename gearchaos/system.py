@@ -33,7 +33,7 @@ from gearchaos.dynamics.exponents import (
     sum_of_exponents,
 )
 from gearchaos.dynamics.following import Branch, Followed, Orbit, follow
-from gearchaos.dynamics.orbits import Orbits, exponents_of, polish
+from gearchaos.dynamics.orbits import NEIGHBOURHOOD, Orbits, exponents_of, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import NOT_LOST, STABILITY_LOSS_TEXTS, StabilityLoss
@@ -294,8 +294,8 @@ class System:
         period : int
             Period in excitation periods, of `repeats_after` mesh periods each.
         guess : array, shape (states,), optional
-            State next to the orbit at mesh phase 0; by default the state after the configured
-            transient.
+            State near the orbit at mesh phase 0, such as the orbit of another value; by default the
+            state after the configured transient.
 
         Returns
         -------
@@ -325,9 +325,10 @@ class System:
             transient = repeats * max(-(-self.config.integration.transient_periods // repeats), 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
         periods = np.array([period], np.int32)
-        found = polish(
-            self._record, checked_state("guess", guess, self.states), periods, self._plan
-        )
+        # A motion that has settled is at its orbit; whoever gives a guess decides how near it is.
+        reach = NEIGHBOURHOOD if settled else np.inf
+        start = checked_state("guess", guess, self.states)
+        found = polish(self._record, start, periods, self._plan, reach=reach)
         if not found.converged[0]:
             where = "where the motion has settled" if settled else "next to the guess"
             raise ConfigurationError(

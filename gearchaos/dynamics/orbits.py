@@ -65,7 +65,12 @@ class Orbits(NamedTuple):
 
 
 def polish(
-    system: LaneSystem, guess: Floats, period: Counts, plan: Plan, scale: Floats | None = None
+    system: LaneSystem,
+    guess: Floats,
+    period: Counts,
+    plan: Plan,
+    scale: Floats | None = None,
+    reach: float = NEIGHBOURHOOD,
 ) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
@@ -81,6 +86,8 @@ def polish(
         Method and steps per period; crossings are always resolved.
     scale : array, shape (states,), optional
         Scales of the states; by default those of the section of each lane, see the notes.
+    reach : float
+        Largest distance between an orbit and its guess, in these scales.
 
     Returns
     -------
@@ -109,7 +116,7 @@ def polish(
     )
     if chosen.size:
         maps = PeriodMaps.with_method(system.of(chosen), period[chosen], plan)
-        search = _Search(maps, guess[chosen], scale)
+        search = _Search(maps, guess[chosen], scale, reach)
         for all_lanes, some in zip(orbits, search.found(), strict=True):
             all_lanes[chosen] = some
     return orbits
@@ -119,11 +126,11 @@ class _Search:
     """Newton's method for the orbits of some lanes.
 
     ``guess`` (lanes, states); ``scale`` (states,): scales of the states, or None for those of the
-    section of each lane.
+    section of each lane; ``reach``: largest distance from the guess.
     """
 
-    def __init__(self, maps: PeriodMaps, guess: Floats, scale: Floats | None) -> None:
-        self._maps, self._guess, self._points = maps, guess, guess.copy()
+    def __init__(self, maps: PeriodMaps, guess: Floats, scale: Floats | None, reach: float) -> None:
+        self._maps, self._guess, self._points, self._reach = maps, guess, guess.copy(), reach
         passage = maps.passed(guess)
         self._section, self._jacobian = passage.section, passage.jacobian
         # The points before the first are NaN.
@@ -182,7 +189,7 @@ class _Search:
             # At least half of the predicted decrease: beyond a fold it falls, but not to 0.
             better = ~taken & (distance < (1.0 - share / 2.0) * self._residual[lanes])
             away = _distance(trials[number], self._guess[lanes], self._scale[lanes])
-            better &= away < NEIGHBOURHOOD
+            better &= away < self._reach
             one = lanes[better]
             self._points[one], self._section[one] = trials[number, better], passed[number, better]
             self._jacobian[one], self._known[one] = whole.jacobian[better], number == 0

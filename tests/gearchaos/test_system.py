@@ -72,6 +72,13 @@ def test_a_motion_settles_on_the_orbit_that_is_asked_for(doubled):
         doubled.orbit(period=3)
 
 
+def test_the_orbit_of_another_value_is_a_guess():
+    other, system = (gearchaos.System(PAN2021, pitch_error=one) for one in (5.0, 6.0))
+    found, settled = system.orbit(guess=other.orbit().point), system.orbit()
+    assert np.abs(found.point - other.orbit().point).max() > 0.01
+    assert found.point == pytest.approx(settled.point, abs=1e-9)
+
+
 def test_an_orbit_is_followed_to_where_its_period_doubles(doubled):
     branch = doubled.follow(doubled.orbit(period=2), "pitch_error", 10.75, 11.6)
     assert branch.loss is StabilityLoss.PERIOD_DOUBLING
