@@ -28,6 +28,7 @@ from gearchaos.options import (
     one_format,
     placed_coordinates,
 )
+from gearchaos.progress import count_of
 
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
@@ -328,7 +329,8 @@ def remarks(
         below = f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below"
         yield f"{below}, {crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
     if mixed:
-        yield f"{mixed} periodic lanes settled within their record, which begins with another"
+        lanes = f"{count_of(mixed, 'periodic lane')} settled within the record, which begins with"
+        yield f"{lanes} another"
         yield "motion; raise integration.transient_periods to leave it out"
 
 

@@ -160,9 +160,9 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
     if not store.own_lanes:
         used = len(shared_blocks(len(run.lanes), shard.of))
         said = [
-            f"shard {options.shard} has no lanes: the {len(run.lanes)} lanes of the sweep are "
-            f"{count_of(used, 'block')}, one for each of the first {used} shards; "
-            "fewer shards are enough"
+            f"shard {options.shard} has no lanes: {count_of(len(run.lanes), 'lane')} make "
+            f"{count_of(used, 'block')}, and a shard needs one; {count_of(used, 'shard')} "
+            f"{'is' if used == 1 else 'are'} enough"
         ]
     say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")
     return OK

@@ -12,6 +12,7 @@ from gearchaos.identification.loading import Problem
 from gearchaos.identification.search import STEPS_ALONE, answers_of, budget_of
 from gearchaos.identification.tried import Tried
 from gearchaos.models.gear_pair.group_table import SWEEPABLE_GROUPS
+from gearchaos.progress import count_of
 
 NEAREST = 3  # Nearest steps in each direction; their median misfit is that of the surroundings.
 
@@ -121,7 +122,7 @@ def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
 
 def _counted(observations: int, unknowns: int) -> str:
     """Word the numbers of observations and of unknowns."""
-    text = f"{observations} observations, {unknowns} unknowns"
+    text = ", ".join([count_of(observations, "observation"), count_of(unknowns, "unknown")])
     if observations < unknowns:
         free = unknowns - observations
         text += f": at least {free} combination{'s' if free > 1 else ''} of them not determined"

@@ -89,7 +89,7 @@ def test_a_shard_without_lanes_says_so_and_the_others_join(tmp_path):
     few = ("--set", "sweep.count=4")
     empty = sweep(tmp_path, *few, "--shard", "2/2")
     assert empty.code == 0
-    assert "shard 2/2 has no lanes: the 4 lanes of the sweep are 1 block" in empty.err
+    assert "shard 2/2 has no lanes: 4 lanes make 1 block, and a shard needs one" in empty.err
     assert "kernel" not in empty.err
     assert sweep(tmp_path, *few, "--shard", "1/2").code == 0
     assert run_module("gearchaos.merge", "gears.h5", cwd=tmp_path).code == 0

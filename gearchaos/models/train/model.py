@@ -66,7 +66,7 @@ class TrainModel(MachineModel):
             yield f"{', '.join(tight)}: half_backlash_um = 0, there is no backlash"
         loads = [shaft.torque_Nm for shaft in config.shaft.values()]
         if loads and not any(loads) and not any("torque" in path for path in config.swept):
-            yield "no shaft has torque_Nm: the train runs without load"
+            yield "no shaft has a torque_Nm other than 0: the train runs without load"
         yield from super().remarks(config, system, parameters)
 
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:

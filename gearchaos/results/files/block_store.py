@@ -16,6 +16,7 @@ import numpy as np
 from gearchaos.arrays import Array, Arrays, Integers
 from gearchaos.errors import FileError
 from gearchaos.outputs.variable import Variable, lane_axes, require_listed
+from gearchaos.progress import count_of
 from gearchaos.results.files.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.files.block_folder import (
     LOCK,
@@ -111,8 +112,8 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             settle_manifest(self.folder, decisive, beside, **how)
             if finished and not resume:
                 raise FileError(
-                    f"{self.folder}: holds {len(finished)} finished blocks of an earlier run; "
-                    "continue it with --resume, or delete this folder"
+                    f"{self.folder}: holds {count_of(len(finished), 'finished block')} of an "
+                    "earlier run; continue it with --resume, or delete this folder"
                 )
         except BaseException:
             self._end([LOCK] if self._lock.new and self._lock.alone() else [])
