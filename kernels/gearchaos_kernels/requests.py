@@ -39,9 +39,8 @@ def _require_sound(plan: Plan) -> None:
     for name in "transient_periods", "recorded_periods", "section_points", "history_periods":
         if getattr(plan, name) < 0:
             raise ValueError(f"{name} = {getattr(plan, name)}: must be at least 0")
+    total = plan.transient_periods + plan.recorded_periods
     for name in "section_points", "history_periods":
-        if getattr(plan, name) > plan.recorded_periods:
-            raise ValueError(
-                f"{name} = {getattr(plan, name)}: must be at most recorded_periods, "
-                f"{plan.recorded_periods}"
-            )
+        if getattr(plan, name) > total:
+            rule = f"must be at most transient_periods + recorded_periods, {total}"
+            raise ValueError(f"{name} = {getattr(plan, name)}: {rule}")

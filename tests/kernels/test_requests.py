@@ -29,8 +29,8 @@ def test_states_of_another_shape_are_refused(pairs, shape):
         ({"steps_per_period": 0}, "steps_per_period = 0: must be at least 1"),
         ({"transient_periods": -30}, "transient_periods = -30: must be at least 0"),
         ({"section_points": -1}, "section_points = -1: must be at least 0"),
-        ({"section_points": 11}, "section_points = 11: must be at most recorded_periods, 10"),
-        ({"history_periods": 11}, "history_periods = 11: must be at most recorded_periods, 10"),
+        ({"section_points": 41}, r"section_points = 41: must be at most .* recorded_periods, 40"),
+        ({"history_periods": 41}, r"history_periods = 41: must be at most .* recorded_periods, 40"),
     ],
 )
 def test_plans_that_cannot_be_are_refused(pairs, changes, words):
