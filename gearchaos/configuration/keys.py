@@ -122,7 +122,8 @@ class Key:
     @property
     def valid(self) -> Range:
         """The range of a number."""
-        rules = [(rule, name) for rule in self.field.metadata for name in Range._fields]
+        declared = [*self.field.metadata, *_rules_of_number(self.field.annotation)]
+        rules = [(rule, name) for rule in declared for name in Range._fields]
         return Range(**{name: getattr(rule, name) for rule, name in rules if hasattr(rule, name)})
 
     @property
@@ -170,6 +171,14 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
         named = any(typing.get_origin(part) is dict for part in parts)
         for table in tables:
             yield from keys_of(table, f"{here}.{NAME}" if named else here)
+
+
+def _rules_of_number(annotation: Any) -> Iterator[Any]:
+    """Yield the constraints of the number that a value may be, besides other forms."""
+    for part in typing.get_args(annotation):
+        kind, *rules = typing.get_args(part) or (part,)
+        if kind is float:
+            yield from (one for rule in rules for one in getattr(rule, "metadata", ()))
 
 
 def _parts(annotation: Any) -> Iterator[Any]:

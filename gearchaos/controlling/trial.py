@@ -9,10 +9,10 @@ import numpy as np
 from gearchaos.arrays import Floats
 from gearchaos.controlling.controller import Controller
 from gearchaos.engine.kept import variables_of
+from gearchaos.engine.orbit_metadata import states_of
 from gearchaos.engine.run_plan import plan_run
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.control import ControlDrawing
-from gearchaos.outputs.catalogue import SECTION_PART
 from gearchaos.outputs.listing import Catalogue
 from gearchaos.records.contact import contact_summary
 from gearchaos.records.control import ControlledMotion
@@ -68,9 +68,8 @@ class ControlTrial(NamedTuple):
         """
         controller = self.controller
         scale, words = _drawn_input(controller)
-        target, catalogue = controller.maps.points, self._catalogue
-        states = catalogue.variables((), {SECTION_PART: controller.system.states})
-        named = {one.name: one for one in states}
+        target, run = controller.maps.points, plan_run(controller.system.config)
+        named = {one.name: one for one in states_of(run)}
         first, rate = (named[f"section_{name}"] for name in controller.system.states[:2])
         return ControlDrawing(
             motion=self.motion,

@@ -38,7 +38,7 @@ class _Steps(NamedTuple):
     def before(self, solution: Floats) -> Floats:
         """Return the solution at the beginning of the steps from that at their end."""
         moved = np.linalg.solve(np.eye(len(solution)) + self.reach @ solution, self.transition)
-        return symmetric(self.cost + moved.T @ solution @ self.transition)
+        return _symmetric(self.cost + moved.T @ solution @ self.transition)
 
 
 def riccati(a: Floats, b: Floats, state: Floats, inputs: Floats) -> Floats:
@@ -95,12 +95,12 @@ def _of_period(steps: list[_Steps]) -> Floats:
                 break
             change = np.abs(whole.cost - before).max()
             if change <= np.finfo(float).eps * np.abs(whole.cost).max():
-                return symmetric(whole.cost)
+                return _symmetric(whole.cost)
     rule = "no gain stabilises the orbit or its estimate: the Riccati equation has no solution"
     raise ConfigurationError(f"{rule}; change another input, or measure other states")
 
 
-def symmetric(matrix: Floats) -> Floats:
+def _symmetric(matrix: Floats) -> Floats:
     """Return the symmetric part of a matrix."""
     part: Floats = (matrix + matrix.T) / 2.0
     return part

@@ -124,11 +124,9 @@ def find_boundaries(
                 branches = search.along_lines(result, some)
                 searched += len(some)
                 traced = count_of(branches, "branch", "branches")
-                found = count_of(len(search.boundaries.found), "boundary", "boundaries")
-                say(f"{count_of(len(some), 'line')}: {traced}; {found}")
+                say(f"{count_of(len(some), 'line')}: {traced}; {search.boundaries.counted}")
             search.from_changes()
-            found = count_of(len(search.boundaries.found), "boundary", "boundaries")
-            say(f"{found} in all")
+            say(f"{search.boundaries.counted} in all")
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(f"{searched} of {len(places)} lines were searched")
             if keep is not None and search.boundaries.found:

@@ -13,6 +13,7 @@ from gearchaos.dynamics.boundary_passages import PARAMETERS, Following, Passed, 
 from gearchaos.dynamics.boundary_tests import Reference
 from gearchaos.dynamics.side_by_side import run, together
 from gearchaos.engine.map_equations import MapEquations
+from gearchaos.progress import count_of
 from gearchaos.records.boundary import (
     GRAZING_FLIP,
     GRAZING_FOLD,
@@ -75,6 +76,11 @@ class KnownBoundaries:
     def __init__(self, equations: MapEquations, answers: Answers) -> None:
         self.equations, self.answers = equations, answers
         self.found: list[TracedBoundary] = []
+
+    @property
+    def counted(self) -> str:
+        """The number of boundaries in words."""
+        return count_of(len(self.found), "boundary", "boundaries")
 
     def follow(self, searches: list[Following[Begun]]) -> None:
         """Follow the boundaries through points that lie on none that is known."""

@@ -3,39 +3,32 @@
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan
-from gearchaos_kernels.models.linear.system import LinearSystems
 
+import gearchaos
 from gearchaos.dynamics.arclength import along_the_way
 from gearchaos.dynamics.branch_range import BranchRange
 from gearchaos.dynamics.branches import trace
 from gearchaos.dynamics.embedded import record_length
 from gearchaos.dynamics.near_grazings import near_grazings
+from gearchaos.models.registry import system_of
 from gearchaos.records.branch import notes_of
+
+from .test_branches import SPUR_PAIR
 
 DAMPING, LOAD = 0.4, 0.2
 PEAK = 1.0 / np.sqrt(1.0 - DAMPING**2 / 2.0)
 """The frequency at which the response without separation is largest."""
 
 
+AMPLITUDE = DAMPING * np.sqrt(1.0 - DAMPING**2 / 4.0) * LOAD * (1.0 - 1e-5)
+PAIR = gearchaos.Configuration.from_toml(
+    SPUR_PAIR.format(load=LOAD, amplitude=AMPLITUDE, damping=DAMPING), "spur.toml"
+)
+
+
 def spur_pairs(frequency):
     """Return pairs whose teeth nearly separate at the frequency `PEAK`."""
-    lanes, one = frequency.size, np.ones((frequency.size, 1, 1))
-    force, spring = np.zeros((lanes, 1, 3)), np.zeros((lanes, 1, 3))
-    amplitude = DAMPING * np.sqrt(1.0 - DAMPING**2 / 4.0) * LOAD * (1.0 - 1e-5)
-    force[:, 0, 0], force[:, 0, 1], spring[:, 0, 0] = LOAD, amplitude * frequency**2, 1.0
-    return LinearSystems(
-        frequency=frequency,
-        position=0.0 * one,
-        rate=0.0 * one,
-        reaction=one,
-        force=force,
-        gap=one,
-        motion=0.0 * spring,
-        stiffness=spring,
-        damping=np.full((lanes, 1), DAMPING),
-        half_clearance=np.ones((lanes, 1)),
-        orders=(1,),
-    )
+    return system_of(PAIR, {"frequency": frequency}, PAIR.needed_effects)
 
 
 def test_orbits_of_more_than_100_mesh_periods_have_no_grazings_and_a_note_says_so():

@@ -8,7 +8,6 @@ import numpy as np
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.rules import Rules
-from gearchaos.configuration.tables import swept_values
 from gearchaos.models.linear.machine import without_drift
 from gearchaos.models.linear.tables import MATRICES, Row, Shares
 
@@ -48,16 +47,6 @@ def _rows_name_coordinates(config: "LinearConfiguration") -> Iterator[Fault]:
         if row is not None and not any(row.values()):
             remedy = f"give a factor to one of {', '.join(names)}"
             yield Fault(path, "has no coordinate with a factor other than 0", remedy, row)
-
-
-@RULES.reads("clearance")
-def _swept_stiffnesses_are_positive(config: "LinearConfiguration") -> Iterator[Fault]:
-    """A sweep over the stiffness of an element has no negative value."""
-    for table, sweep in config.sweeps.items():
-        path, least = sweep.parameter, float(swept_values(sweep).min())
-        if path.startswith("clearance.") and path.endswith(".stiffness") and least < 0.0:
-            rule = f"{path} must be at least 0, and the least value is {least:g}"
-            yield Fault(f"{table}.parameter", rule, "sweep inside that range", path)
 
 
 @RULES.reads("model", "clearance", "force")
